@@ -27,7 +27,7 @@ from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWr
 from sessions.recording.head import certificate_for, simulated_sentence, software_versions, without_home
 from sessions.recording.manifest import is_sealed
 from sessions.recording.recovery import fold_log
-from sessions.recording.storage import RESERVE, check_room, need, unsafe
+from sessions.recording.storage import RESERVE, check_room, unsafe
 from sessions.run import resuming
 from sessions.run.runner import STOPPED_BY_USER, Continuation, Ending, Operator, run_session
 from sessions.run.steps import Command, Event
@@ -111,7 +111,7 @@ def begin(request: m.StartSession, bench: Bench, clock: Clock) -> SessionSetup:
     info = _transducer_info(bench) if plan.forces else None
     folder = Path(request.folder)
     _check_people(people, plan, bench, folder)
-    check_room(folder, need(plan, None if info is None else info.rate))
+    check_room(folder, plan, None if info is None else info.rate)
     settings = [*request.settings, *_people_settings(people, bench.uri if info is not None else None)]
     settings += _folder_settings(folder, any_folder=request.any_folder)
     writer = SessionWriter.create(
@@ -135,7 +135,7 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> SessionSetup
     recording = Recording.open(folder)
     resuming.check_resumable(recording)
     _folder_settings(folder, any_folder=ANY_FOLDER in _recorded_settings(recording))
-    check_room(folder, need(recording.plan, None if recording.info is None else recording.info.rate))
+    check_room(folder, recording.plan, None if recording.info is None else recording.info.rate)
     factor = float(recording.provenance["clock"]["factor"])
     if clock.factor != factor:
         raise NotNow(f"{folder} was recorded at pace {factor:g}: start the recorder with this pace")

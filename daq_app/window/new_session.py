@@ -19,7 +19,7 @@ from sessions.plan.study import Study, StudyError, enrol, is_study, open_study, 
 from sessions.recording import Recording, RecordingError, Setting
 from sessions.recording.manifest import is_sealed
 from sessions.recording.recovery import is_in_use
-from sessions.recording.storage import check_room, need
+from sessions.recording.storage import check_room
 from sessions.run.resuming import check_resumable
 from sessions.toml_file import SettingsError
 
@@ -164,7 +164,7 @@ def refusals(form: SessionForm, bench: Bench) -> Refusal:
     if isinstance(session, Refusal):
         return session
     try:
-        check_room(Path(session.folder).absolute().parent, need(session.plan, bench.rate if form.forces else None))
+        check_room(Path(session.folder).absolute().parent, session.plan, bench.rate if form.forces else None)
     except (RecordingError, OSError) as error:
         return Refusal({"folder": _sentence(error)})
     return wrong

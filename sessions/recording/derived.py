@@ -189,7 +189,7 @@ UNBLINDING = "unblinding.json"  # in a session's folder, once its key was opened
 
 
 def reveal(recording: Recording) -> Recording:
-    """Return a session with the indices of its stimuli once its key was opened. Raises RecordingError for a wrong key."""
+    """Return a session with its indices once its key was opened. Raises RecordingError for another key than its own."""
     if not recording.plan.blinded:
         return recording
     stored = load_derived(recording.folder, UNBLINDING)

@@ -12,7 +12,6 @@ import subprocess
 import sys
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path, PurePath
 from typing import NamedTuple
@@ -30,38 +29,21 @@ RESERVE_FILE = "session.reserve"
 RESERVE = 16 * 2**20  # enough for the last seconds of readings, the end, and folding the log [bytes]
 
 
-@dataclass(frozen=True, slots=True)
-class Need:
-    """What a session is expected to take."""
+def check_room(folder: Path, plan: SessionPlan, rate: float | None) -> None:
+    """Raise RecordingError where the disk `folder` is to lie on has less room than a session may take.
 
-    duration: float  # [s]
-    rate: float  # [Hz]; 0 without a transducer
-    size: int  # [bytes]
-
-    @property
-    def sentence(self) -> str:
-        """Return the arithmetic."""
-        return (
-            f"{self.duration / 60:.0f} min at {self.rate:g} readings a second of {BYTES_A_READING} bytes, "
-            f"kept twice, and {DISK_MARGIN / 1e6:.0f} MB beside: {self.size / 1e6:.0f} MB"
-        )
-
-
-def need(plan: SessionPlan, rate: float | None) -> Need:
-    """Return what a session is expected to take, `rate` [Hz] being nan where unknown, None without a transducer."""
+    `rate` is that of the readings [Hz], nan where it is unknown, None without a transducer.
+    """
     duration = len(plan.trials) * TRIAL_TIME + len(plan.blocks) * BLOCK_TIME
     rows_a_second = 0.0 if rate is None else rate if isfinite(rate) else RATE_UNKNOWN
-    return Need(duration, rows_a_second, round(COPIES * duration * rows_a_second * BYTES_A_READING) + DISK_MARGIN)
-
-
-def check_room(folder: Path, need: Need) -> None:
-    """Raise RecordingError where the disk `folder` is to lie on has less room than wanted."""
+    size = round(COPIES * duration * rows_a_second * BYTES_A_READING) + DISK_MARGIN
     existing = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
     free = shutil.disk_usage(existing).free
-    if free < need.size:
+    if free < size:
         raise RecordingError(
-            f"{folder} has {free / 1e6:.0f} MB of room, and the session may need {need.sentence}; "
-            "free space on the disk, or record on another"
+            f"{folder} has {free / 1e6:.0f} MB of room, and the session may need {duration / 60:.0f} min at "
+            f"{rows_a_second:g} readings a second of {BYTES_A_READING} bytes, kept twice, and {DISK_MARGIN / 1e6:.0f} "
+            f"MB beside: {size / 1e6:.0f} MB; free space on the disk, or record on another"
         )
 
 

@@ -122,20 +122,10 @@ class ContinuedClock:
         self.clock.sleep(seconds)
 
 
-@dataclass(frozen=True, slots=True)
-class Gap:
-    """The time between the last thing recorded and the resumption, by the wall clock."""
-
-    last_ns: int  # session clock of the last thing recorded [ns]
-    duration: float | None  # [s]; None where the wall clock ran backwards meanwhile
-    clock_offset_ns: int  # session clock minus the clock of the program that goes on [ns]
-    resumed_utc: str
-
-
 def continue_clock(
     recording: Recording, last_block: ReadingBlock, clock: Clock, date: datetime
-) -> tuple[ContinuedClock, Gap]:
-    """Return a clock that continues the session's, and the gap between.
+) -> tuple[ContinuedClock, dict[str, Any]]:
+    """Return a clock that continues the session's, and what the event `resumed` tells of the gap between.
 
     `last_block` holds the last readings (or none). The session clock goes on from its last instant by as much as the
     wall clock, now at `date`, says has passed, a second more or less: no two clocks of a computer survive its restart.
@@ -151,8 +141,12 @@ def continue_clock(
     gap_ns = elapsed_ns - round((last_ns - at_ns) / float(recording.provenance["clock"]["factor"]))
     offset_ns = last_ns + max(gap_ns, LEAST_GAP_NS) - clock.now_ns()  # as `_clock_at_resumption` reads it again
     duration = gap_ns * 1e-9 if gap_ns * 1e-9 > -CLOCKS_AGREE else None
-    resumed_utc = date.astimezone(UTC).isoformat(timespec="milliseconds")
-    gap = Gap(last_ns, None if duration is None else max(duration, 0.0), offset_ns, resumed_utc)
+    gap = {
+        "gap": None if duration is None else max(duration, 0.0),  # [s]; None where the wall clock ran backwards
+        "last_ns": last_ns,  # session clock of the last thing recorded
+        "clock_offset_ns": offset_ns,  # session clock minus the clock of the program that goes on
+        "resumed_utc": date.astimezone(UTC).isoformat(timespec="milliseconds"),
+    }
     return ContinuedClock(clock, offset_ns), gap
 
 
@@ -184,13 +178,10 @@ class Seam:
         return replace(block, sequence=block.sequence + self.sequence_offset, time=block.time + self.time_offset)
 
 
-def resumed_data(gap: Gap, info: TransducerInfo | None, software: Mapping[str, str]) -> dict[str, Any]:
+def resumed_data(gap: Mapping[str, Any], info: TransducerInfo | None, software: Mapping[str, str]) -> dict[str, Any]:
     """Return what the event `resumed` holds."""
     return {
-        "gap": gap.duration,
-        "last_ns": gap.last_ns,
-        "clock_offset_ns": gap.clock_offset_ns,
-        "resumed_utc": gap.resumed_utc,
+        **gap,
         "uri": None if info is None else info.uri,
         "settings": {} if info is None else dict(info.settings),
         "software": dict(software),

@@ -19,7 +19,7 @@ from sessions.plan.protocols.protocol import ENGLISH, PRE_EVALUATION, Protocol, 
 from sessions.prediction import QUANTITIES
 from sessions.recording import RecordingError
 from sessions.report.wording import shown_response
-from sessions.toml_file import NotAllowed, toml_text
+from sessions.toml_file import toml_text
 from solver.quantities import FIELDS
 
 EXAMPLE = "daq-app translate sensotact-friction --language nl --out dutch.toml"
@@ -38,10 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     if (options.protocol is not None) + options.program + options.window != 1:
         raise WrongValue("give a PROTOCOL, --program or --window; one of the three")
-    try:
-        check_language("--language", options.language)
-    except NotAllowed as wrong:
-        raise WrongValue(str(wrong)) from wrong
+    check_language("--language", options.language)
     if options.window:
         text, gaps = program_texts(EXPERIMENTER, window_texts(), options.language)
     elif options.program:
