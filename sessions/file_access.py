@@ -278,30 +278,3 @@ def as_type(value: object, form: type[T]) -> T:
         return msgspec.convert(value, form)
     except msgspec.ValidationError as error:
         raise ValueError(str(error).replace("`$.", "`")) from error
-
-
-def complete(document: Mapping[str, Any], form: type[T]) -> T:
-    """Return a document that the program wrote itself, as the type `form`.
-
-    A name may be missing only where nothing is known under it. Raises ValueError as `as_type` does.
-    """
-    value = as_type(document, form)
-    for name in _missing_keys(document, msgspec.to_builtins(value)):
-        raise ValueError(f"Object missing required field `{name}`")
-    return value
-
-
-def _missing_keys(document: object, complete: object, path: str = "") -> Iterator[str]:
-    """Yield the path of each name that `document` lacks and for which `complete` has a default other than None."""
-    if isinstance(complete, (list, tuple)):
-        items = zip(cast("list[Any]", document), cast("list[Any]", complete), strict=True)
-        for index, (item, complete_item) in enumerate(items):
-            yield from _missing_keys(item, complete_item, f"{path}[{index}]")
-    elif isinstance(complete, dict):
-        table = cast("Mapping[str, Any]", document)
-        for name, item in cast("dict[str, Any]", complete).items():
-            key = f"{path}.{name}" if path else name
-            if name in table:
-                yield from _missing_keys(table[name], item, key)
-            elif item is not None:
-                yield key

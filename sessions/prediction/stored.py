@@ -6,9 +6,9 @@ from typing import Annotated, Any, Literal, cast
 
 import msgspec
 
-from sessions.file_access import complete
 from sessions.plan.plan import Stimulus
 from sessions.prediction.options import PredictionOptions, template
+from sessions.recording.derived import complete
 from sessions.strokes.decisions import Decision
 from sessions.strokes.stroke import FIXED, AreaLaw, Meaning
 from sessions.toml_file import from_table

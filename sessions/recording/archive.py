@@ -36,7 +36,10 @@ def seal(folder: Path) -> None:
     recording = Recording.open(folder)
     unfinished = folder / f".{SEALED_FILE}.part"
     try:
-        _clear_unfinished_copies(folder)
+        for copy in (folder / SEALED_FILE, folder / DESCRIPTION_FILE):  # left by an interrupted sealing
+            if copy.exists():
+                copy.chmod(0o644)  # some systems remove no read-only file
+                copy.unlink()
         unfinished.unlink(missing_ok=True)
         write_copy(recording, unfinished)
         put_in_place(unfinished, folder / SEALED_FILE)
@@ -87,11 +90,3 @@ def _contradictions(recording: Recording) -> Iterator[str]:
     for name, stored_value, _ in unlike(stored, current, ""):
         if stored_value is not ABSENT:  # else an older version did not tell it
             yield f"{name.removeprefix('.') or 'all'} of {DESCRIPTION_FILE} differs from the live file"
-
-
-def _clear_unfinished_copies(folder: Path) -> None:
-    """Remove the copies that an interrupted sealing left; they are made anew from the live file."""
-    for name in (SEALED_FILE, DESCRIPTION_FILE):
-        if (folder / name).exists():
-            (folder / name).chmod(0o644)  # some systems remove no read-only file
-            (folder / name).unlink()

@@ -5,7 +5,9 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeVar, cast
+
+from msgspec import to_builtins
 
 from sessions.file_access import as_type, json_object, json_text, name_failure, read_within_limit, write_whole
 from sessions.plan.study import Key
@@ -16,6 +18,7 @@ from sessions.recording.reader import Recording
 from sessions.recording.schema import DESCRIPTION_FILE, LIVE_FILE, MANIFEST_FILE, SEALED_FILE, RecordingError
 from sessions.toml_file import SettingsError
 
+T = TypeVar("T")
 RECORDED = (LIVE_FILE, SEALED_FILE, DESCRIPTION_FILE, MANIFEST_FILE)
 
 
@@ -129,6 +132,18 @@ def unlike(stored: Any, fresh: Any, path: str, but: frozenset[str] = frozenset()
         yield path, stored, fresh
 
 
+def complete(document: Mapping[str, Any], form: type[T]) -> T:
+    """Return a document that the program wrote itself, as the type `form`.
+
+    A name may be missing only where nothing is known under it. Raises ValueError as `as_type` does.
+    """
+    value = as_type(document, form)
+    for name, stored, default in unlike(document, to_builtins(value), ""):
+        if stored is ABSENT and default is not None:
+            raise ValueError(f"Object missing required field `{name.removeprefix('.')}`")
+    return value
+
+
 def differences(stored: object, fresh: object, path: str) -> Iterator[str]:
     """Yield a sentence for each value that was stored otherwise than it comes out now; timings are left out.
 
@@ -142,19 +157,14 @@ def differences(stored: object, fresh: object, path: str) -> Iterator[str]:
             entries = len(cast("Sequence[Any]", old)), len(cast("Sequence[Any]", new))
             yield f"{name} was stored with {entries[0]} entries and comes out with {entries[1]}"
         else:
-            yield f"{name} was stored as {old!r} and comes out as {new!r}{_relative_change(cast('object', old), new)}"
+            scalable = isinstance(old, float) and isinstance(new, float) and old != 0.0
+            change = f" ({100.0 * (new / old - 1.0):+.3g} %)" if scalable else ""
+            yield f"{name} was stored as {old!r} and comes out as {new!r}{change}"
 
 
 def _rank(key: str) -> tuple[int, str]:
     """Return where a name stands among the differences: what others come from first, what comes of others last."""
     return (0 if key in ("settings", "options", "decisions") else 2 if key == "bootstrap" else 1), key
-
-
-def _relative_change(stored: object, fresh: object) -> str:
-    """Say how much a number changed, where that can be said."""
-    if not isinstance(stored, float) or not isinstance(fresh, float) or stored == 0.0:
-        return ""
-    return f" ({100.0 * (fresh / stored - 1.0):+.3g} %)"
 
 
 def explain_differences(name: str, stored: Mapping[str, Any], present: Mapping[str, str]) -> str:

@@ -90,12 +90,9 @@ _RECORDED_AS: dict[type[steps.Event], str] = {steps.MagnitudeEstimate: "number_g
 _EVENTS: dict[str, type[steps.Event]] = {kind_of(event): event for event in get_args(steps.Event)}
 
 
-# What experimenter and subject do. All else that happens comes of readings and clock, and is found in them once more.
-_ACTS = frozenset({
-    "begin", "stimulus_mounted", "stroke_done", "scored", "number_given", "chosen", "note", "redo", "undo_redo", "skip",
-    "pause", "resume", "abort", "finish",
-})  # fmt: skip
-NOTICED = frozenset({"zeroed", "contact_onset", "finger_lifted", "settled", "rest_over"})  # by the runner
+# What the runner notices comes of readings and clock, and is found in them once more. All else people do.
+NOTICED = frozenset({"zeroed", "contact_onset", "finger_lifted", "settled", "rest_over"})
+_ACTS = _EVENTS.keys() - NOTICED
 
 
 @dataclass(frozen=True, slots=True)

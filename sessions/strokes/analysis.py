@@ -7,9 +7,9 @@ from typing import Any
 import msgspec
 
 from drivers.readings import ReadingBlock
-from sessions.file_access import complete
 from sessions.plan.plan import Trial
 from sessions.recording import Recording
+from sessions.recording.derived import complete
 from sessions.strokes.bootstrap import StrokeIntervals, stroke_intervals
 from sessions.strokes.decisions import OF_SESSION, Decision, DecisionError, Decisions, Value, read
 from sessions.strokes.settings import AnalysisSettings, BootstrapSettings

@@ -318,8 +318,8 @@ class Protocol:
 def check_phases(protocol: Protocol, phases: Sequence[Phase]) -> None:
     """Raise NotAllowed unless the protocol has these phases."""
     phase_names = list(phases)
-    if not phases or len(set(phases)) < len(phases):
-        raise NotAllowed("phases", phase_names, "there must be at least one, and none may come twice")
+    distinct = 0 < len(phases) == len(set(phases))
+    check(distinct, "phases", phase_names, "there must be at least one, and none may come twice")
     if "pre-evaluation" in phases and protocol.pre_evaluation is None:
         raise NotAllowed("phases", phase_names, "a pre-evaluation needs a table [pre_evaluation] with its instruction")
     if "pre-evaluation" in phases and protocol.scale.answer == "choice":
