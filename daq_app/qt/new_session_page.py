@@ -25,7 +25,6 @@ from daq_app.qt.parts import (
 from daq_app.qt.tokens import GRID, TARGET, px
 from daq_app.window.checklist import CARD_FIELDS, Card, checklist, codes_in, next_code, studies_in
 from daq_app.window.new_session import (
-    SIGNED_AXES,
     Bench,
     SessionForm,
     enrol_subject,
@@ -36,7 +35,7 @@ from daq_app.window.new_session import (
 )
 from daq_app.window.state import LanguageChosen, Message
 from daq_app.wording import tr, tr_noop
-from sessions.plan.plan import Hand
+from sessions.plan.plan import NORMALS, Hand
 from sessions.plan.protocols.protocol import ENGLISH, protocol_names
 
 TWO = 565  # at which the cards stand in two columns, before the font's scale [px]
@@ -72,7 +71,7 @@ class NewSessionPage(Panel):
         meaning = tr("height of the face above the transducer's origin in millimetres; may be empty")
         self.height_above = entry(meaning, tr("as stated"))
         meaning = tr("axis of the transducer along which pressing is positive")
-        self.normal = choice(meaning, (tr("as stated"), *SIGNED_AXES))
+        self.normal = choice(meaning, (tr("as stated"), *NORMALS))
         meaning = tr("contact area of finger and surface in square millimetres; may be empty")
         self.area = entry(meaning, tr("as stated"))
         hands = [tr(meaning) for meaning in HAND_NAMES]

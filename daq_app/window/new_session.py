@@ -12,7 +12,7 @@ from daq_app.recorder.messages import Kind, People, StartSession
 from daq_app.window.state import BenchState
 from daq_app.wording import sentence, tr, tr_noop, two_meanings, typed_number
 from sessions.file_access import failure_sentence
-from sessions.plan.plan import Frame, Hand, Phase
+from sessions.plan.plan import NORMALS, Frame, Hand, Phase
 from sessions.plan.protocols.planning import Body, StudyPlace, VisitSetting, is_code, plan
 from sessions.plan.protocols.protocol import AREAS, HEIGHTS, LARGEST_SEED, Protocol, phases_before, protocol
 from sessions.plan.study import Study, StudyError, enrol, is_study, open_study, study_key
@@ -23,7 +23,6 @@ from sessions.recording.storage import check_room
 from sessions.run.resuming import check_resumable
 from sessions.toml_file import SettingsError
 
-SIGNED_AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 PILOT, PILOTS = "PILOT", "pilots"  # code of the simulated subject, and folder below that of the sessions
 _NUMBERS = {
     "height": tr_noop("A height is a number of millimetres from −{highest:.0f} to {highest:.0f}, or left empty."),
@@ -127,12 +126,10 @@ def check_form(
         return Refusal({"subject": _sentence(error)})
     except (SettingsError, OSError) as error:
         return Refusal({"protocol": _sentence(error)})
-    face = session_plan.frame
-    if form.forces and form.height.strip():
-        face = replace(face, height=_number(form.height) or 0.0, height_origin="measured")
-    if form.forces and form.normal in SIGNED_AXES:
-        face = replace(face, normal=form.normal, normal_origin="set")
-    session_plan = replace(session_plan, frame=face)
+    if form.forces:
+        normal = form.normal if form.normal in NORMALS else None
+        height = _number(form.height) or 0.0 if form.height.strip() else None
+        session_plan = replace(session_plan, frame=session_plan.frame.stated(normal, height, "measured"))
     # In a study the folder's name states the purpose of the visit: the protocol is the same in all.
     purpose = session_plan.protocol if study_place is None else "forces" if session_plan.forces else "scores"
     parent = folder_of(form) / PILOTS if form.pilot else place_of(form)

@@ -18,7 +18,7 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.exchange.csv_text import COMMENT, ImportRefused, cell_text, content_of, mend_row, number_in, records
 from sessions.file_access import write_whole
-from sessions.plan.plan import Frame, Origin, SessionPlan
+from sessions.plan.plan import NORMALS, Frame, Origin, SessionPlan
 from sessions.plan.protocols.protocol import HEIGHTS
 from sessions.plan.study import check_code
 from sessions.recording.head import Setting, provenance
@@ -146,7 +146,6 @@ def _common_unit(quantity: str, header_units: set[str | None], option: str | Non
 ORIGINAL_FILE = "original.csv"
 RATE_TOLERANCE = 0.01  # relative difference allowed between a stated rate and that of the file's times [-]
 UNEVEN = 0.05  # relative spread of time steps from which there is no single rate [-]
-NORMALS = ("+x", "-x", "+y", "-y", "+z", "-z")
 _FEWEST = 2
 _LONGEST = 9e9  # of a recording [s]: a session's clock counts nanoseconds in 64 bits
 FASTEST = 1e6  # readings a second [Hz]: ten times those of the fastest device we drive
@@ -219,12 +218,7 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
         "extra_columns": list(layout.extra),
         "first_time_s": float(rows[0, layout.time]) * TIME_UNITS[layout.time_unit] if layout.time is not None else None,
     }
-    frame = Frame(
-        options.normal or Frame().normal,
-        _origin(options.normal),
-        options.height if options.height is not None else Frame().height,
-        _origin(options.height),
-    )
+    frame = Frame().stated(options.normal, options.height)
     writer = SessionWriter.create(
         folder,
         SessionPlan("import", options.subject, 0, "none", (), forces=True, frame=frame),
@@ -362,10 +356,6 @@ def _settings(layout: Columns, frame: Frame, rate: float, rate_origin: Origin, o
         Setting("rate", rate, "Hz", rate_origin),
         Setting("zero as recorded is true", options.zeroed, "", "set" if options.zeroed else "default"),
     ]
-
-
-def _origin(option: object) -> Origin:
-    return "default" if option is None else "set"
 
 
 def _defaults(frame: Frame) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ SubjectSees = Literal["instruction", "trial count", "code", "forces"]
 ExperimenterSees = Literal["trial count", "answer", "forces"]
 PROXIMAL_TO_DISTAL = 1
 DISTAL_TO_PROXIMAL = -1
+NORMALS = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
 class Blinded(ValueError):
@@ -84,10 +85,15 @@ class Block:
 class Frame:
     """How the transducer's axes lie to the stimulus's face, each value with its origin."""
 
-    normal: str = "-z"  # axis of the wrench along which pressing is positive: one of +x -x +y -y +z -z
+    normal: str = "-z"  # axis of the wrench along which pressing is positive, one of `NORMALS`
     normal_origin: Origin = "default"
     height: float = 0.0  # the face above the transducer's origin [mm]
     height_origin: Origin = "default"
+
+    def stated(self, normal: str | None, height: float | None, height_origin: Origin = "set") -> "Frame":
+        """Return the frame with the values that somebody states in place of its own."""
+        frame = self if normal is None else replace(self, normal=normal, normal_origin="set")
+        return frame if height is None else replace(frame, height=height, height_origin=height_origin)
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from daq_app.console import Console, WrongValue
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import People, StartSession
 from drivers.transducer import flagged_words
-from sessions.plan.plan import Frame, Phase
+from sessions.plan.plan import NORMALS, Phase
 from sessions.plan.protocols.planning import Body, StudyPlace, VisitSetting, plan
 from sessions.plan.protocols.protocol import AREAS, Protocol, protocol
 from sessions.plan.study import open_study, study_key
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_shared(parser, "headless", simulate_subject="simulated people", height=height)
     meaning = "simulated seconds a real second, simulated people only (1)"
     parser.add_argument("--pace", type=float, default=1.0, help=meaning)
-    parser.add_argument("--normal", choices=["+x", "-x", "+y", "-y", "+z", "-z"], help="axis along which pressing is +")
+    parser.add_argument("--normal", choices=NORMALS, help="axis along which pressing is +")
     allowed = f"{AREAS[0]:g} to {AREAS[1]:g} (mm2)"
     add_number(parser, "--contact-area", float, AREAS, "of finger and surface, for tau_max", None, "MM2", allowed)
     parser.add_argument("--stroking-hand", choices=["left", "right"], help="recorded; unknown unless stated")
@@ -78,10 +78,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     settings = (Setting("seed", seed, "", "default" if options.seed is None else "set"),)
     with Recorder.start(options.pace, debug=options.debug) as recorder:
         bench = open_device(recorder, options.device) if options.device else None
-        frame = _frame(options, session_plan.frame if bench is None else bench.frame or session_plan.frame)
-        request = StartSession(
-            replace(session_plan, frame=frame), str(folder.absolute()), people, settings, any_folder=options.any_folder
-        )
+        frame = session_plan.frame if bench is None else bench.frame or session_plan.frame
+        session_plan = replace(session_plan, frame=frame.stated(options.normal, options.height))
+        request = StartSession(session_plan, str(folder.absolute()), people, settings, any_folder=options.any_folder)
         outcome = attend_session(recorder, request, console)
     end = outcome.end
     if Path(outcome.folder) != folder.absolute():  # it was taken away meanwhile
@@ -116,12 +115,3 @@ def _refuse_mixtures(options: argparse.Namespace, *, simulated_bench: bool) -> N
         raise WrongValue("--simulate-subject strokes the simulated bench only: give --device sim: or --scores-only")
     if options.pace != 1.0 and not (options.simulate_subject is not None and 0.1 <= options.pace <= 200):
         raise WrongValue(f"--pace {options.pace:g} is not allowed: 0.1 to 200, and only with --simulate-subject")
-
-
-def _frame(options: argparse.Namespace, frame: Frame) -> Frame:
-    """Return the frame as stated by bench or protocol, except for what the command line states."""
-    if options.normal is not None:
-        frame = replace(frame, normal=options.normal, normal_origin="set")
-    if options.height is not None:
-        frame = replace(frame, height=options.height, height_origin="set")
-    return frame

@@ -131,12 +131,7 @@ class Face:
     @property
     def frame(self) -> Frame:
         """Return the frame, each value with its origin."""
-        frame = Frame()
-        if self.normal is not None:
-            frame = replace(frame, normal=self.normal, normal_origin="set")
-        if self.height is not None:
-            frame = replace(frame, height=self.height, height_origin=self.height_origin)
-        return frame
+        return Frame().stated(self.normal, self.height, self.height_origin)
 
 
 @dataclass(frozen=True, slots=True)
