@@ -129,7 +129,7 @@ def check_form(
     if form.forces:
         normal = form.normal if form.normal in NORMALS else None
         height = _number(form.height) or 0.0 if form.height.strip() else None
-        session_plan = replace(session_plan, frame=session_plan.frame.stated(normal, height, "measured"))
+        session_plan = replace(session_plan, frame=session_plan.frame.with_values(normal, height, "measured"))
     # In a study the folder's name states the purpose of the visit: the protocol is the same in all.
     purpose = session_plan.protocol if study_place is None else "forces" if session_plan.forces else "scores"
     parent = folder_of(form) / PILOTS if form.pilot else place_of(form)

@@ -218,7 +218,7 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
         "extra_columns": list(layout.extra),
         "first_time_s": float(rows[0, layout.time]) * TIME_UNITS[layout.time_unit] if layout.time is not None else None,
     }
-    frame = Frame().stated(options.normal, options.height)
+    frame = Frame().with_values(options.normal, options.height)
     writer = SessionWriter.create(
         folder,
         SessionPlan("import", options.subject, 0, "none", (), forces=True, frame=frame),

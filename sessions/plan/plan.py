@@ -90,7 +90,7 @@ class Frame:
     height: float = 0.0  # the face above the transducer's origin [mm]
     height_origin: Origin = "default"
 
-    def stated(self, normal: str | None, height: float | None, height_origin: Origin = "set") -> "Frame":
+    def with_values(self, normal: str | None, height: float | None, height_origin: Origin = "set") -> "Frame":
         """Return the frame with the values that somebody states in place of its own."""
         frame = self if normal is None else replace(self, normal=normal, normal_origin="set")
         return frame if height is None else replace(frame, height=height, height_origin=height_origin)

@@ -79,7 +79,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     with Recorder.start(options.pace, debug=options.debug) as recorder:
         bench = open_device(recorder, options.device) if options.device else None
         frame = session_plan.frame if bench is None else bench.frame or session_plan.frame
-        session_plan = replace(session_plan, frame=frame.stated(options.normal, options.height))
+        session_plan = replace(session_plan, frame=frame.with_values(options.normal, options.height))
         request = StartSession(session_plan, str(folder.absolute()), people, settings, any_folder=options.any_folder)
         outcome = attend_session(recorder, request, console)
     end = outcome.end

@@ -131,7 +131,7 @@ class Face:
     @property
     def frame(self) -> Frame:
         """Return the frame, each value with its origin."""
-        return Frame().stated(self.normal, self.height, self.height_origin)
+        return Frame().with_values(self.normal, self.height, self.height_origin)
 
 
 @dataclass(frozen=True, slots=True)
