@@ -283,7 +283,7 @@ class Work:
 
             progress = self.progress_listener(tr("carrying the uncertainty of friction through"))
             with_them = replace(self._prediction, options=replace(self._prediction.options, intervals=True))
-            self._prediction = with_intervals(self._analysis, with_them, progress=progress)
+            self._prediction = with_intervals(with_them, progress)
             pages.write_report(findings(self._recording, self._analysis, self._prediction), path)
             return str(path)
         made_by = {"made_by": software_versions()}

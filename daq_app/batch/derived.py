@@ -213,8 +213,8 @@ def _predict(
 
     prediction = predict(analysis, plan, options, stage_progress(0))
     if options.intervals:
-        prediction = with_intervals(analysis, prediction, progress=stage_progress(1))
-    return with_alternatives(prediction, stage_progress(stages - 1), analysis)
+        prediction = with_intervals(prediction, stage_progress(1))
+    return with_alternatives(prediction, stage_progress(stages - 1))
 
 
 def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = None) -> dict[str, Any]:

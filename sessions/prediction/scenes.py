@@ -304,15 +304,11 @@ def predict(
         if not is_small:
             report(number, rows[number], None)
     return SessionPrediction(
-        simulated=analysis.simulated,
+        analysis=analysis,
         trials=tuple(rows),
         width=width,
         width_origin="assumed" if width == Finger().width else "set",
         options=options,
-        decisions=analysis.decisions,
-        area=analysis.settings.area,
-        gain_error=analysis.settings.gain_error,
-        bootstrap_seed=analysis.settings.bootstrap_seed,
     )
 
 

@@ -9,8 +9,9 @@ import msgspec
 from sessions.plan.plan import Stimulus
 from sessions.prediction.options import PredictionOptions, template
 from sessions.recording.derived import complete
+from sessions.strokes import Analysis
 from sessions.strokes.decisions import Decision
-from sessions.strokes.stroke import FIXED, AreaLaw, Meaning
+from sessions.strokes.stroke import Meaning
 from sessions.toml_file import from_table
 from solver import Prediction, Scene
 from solver.prediction import History, Response, Skin
@@ -212,15 +213,11 @@ class TrialPrediction(TrialNumbers):
 class SessionPrediction:
     """What the model says of a session."""
 
-    simulated: bool
+    analysis: Analysis  # of the strokes whose friction the model got
     trials: tuple[TrialPrediction, ...]
     width: float  # of the finger [mm]
     width_origin: str  # "set" or "assumed"
     options: PredictionOptions
-    decisions: tuple[Decision, ...] = ()  # of people about the strokes, in force
-    area: AreaLaw = FIXED  # by which tau_max was computed
-    gain_error: float | None = None  # of each axis, which the intervals hold [-]; None: the assumed one
-    bootstrap_seed: int = 0  # of the intervals
 
     @property
     def finger(self) -> Scene:
@@ -230,16 +227,16 @@ class SessionPrediction:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, None where honesty allows no number."""
-        options = asdict(self.options)
+        options, settings = asdict(self.options), self.analysis.settings
         default = asdict(PredictionOptions())
         origin = {name: "default" if value == default[name] else "set" for name, value in options.items()}
         return {
-            **({"simulated": "SIMULATED"} if self.simulated else {}),
+            **({"simulated": "SIMULATED"} if self.analysis.simulated else {}),
             "trials": [trial.to_dict() for trial in self.trials],
-            "decisions": [decision.to_dict() for decision in self.decisions],
-            "area": asdict(self.area),
-            "gain_error": self.gain_error,
-            "bootstrap_seed": self.bootstrap_seed,
+            "decisions": [decision.to_dict() for decision in self.analysis.decisions],
+            "area": asdict(settings.area),
+            "gain_error": settings.gain_error,
+            "bootstrap_seed": settings.bootstrap_seed,
             "width": self.width,
             "width_origin": self.width_origin,
             "options": _with_former_names(options),

@@ -38,7 +38,6 @@ from sessions.prediction.stored import (
     settled_numbers,
     variants,
 )
-from sessions.strokes import Analysis
 from sessions.strokes.bootstrap import FrictionDraws, friction_draws
 from solver import Prediction, Scene
 from solver.response.nearby import Nearby
@@ -52,7 +51,7 @@ _QUANTILES = (0.025, 0.975)
 
 
 def with_intervals(
-    analysis: Analysis, prediction: SessionPrediction, progress: Progress | None = None, *, both_ways: bool = True
+    prediction: SessionPrediction, progress: Progress | None = None, *, both_ways: bool = True
 ) -> SessionPrediction:
     """Return a prediction with an interval of each SED it holds, where its options ask for them.
 
@@ -64,21 +63,22 @@ def with_intervals(
     answers: list[Prediction | str] = [row.prediction or _reason(row, "sed") for row in rows]
     if both_ways:
         answers += [row.opposite or _reason(row, "opposite_sed") for row in rows]
-    draws = (draws_of(analysis, prediction) * 2)[: len(answers)]
+    draws = (draws_of(prediction) * 2)[: len(answers)]
     intervals = iter(intervals_of(answers, draws, tau_scale(prediction.options), progress))
     with_own = [replace(row, interval=next(intervals)) for row in rows]
     trials = tuple(replace(row, opposite_interval=next(intervals, None)) for row in with_own)
     return replace(prediction, trials=trials)
 
 
-def draws_of(analysis: Analysis, prediction: SessionPrediction) -> list[DrawsOrReason]:
+def draws_of(prediction: SessionPrediction) -> list[DrawsOrReason]:
     """Return the draws of each trial's friction, one in each repeat, or why there are none."""
     draws: list[DrawsOrReason] = []
+    strokes, bootstrap = prediction.analysis.strokes, prediction.analysis.bootstrap
     for row in prediction.trials:
         if row.stroke is None or row.mu is None or row.tau_max is None:
             draws.append(_reason(row, "sed"))
             continue
-        friction = friction_draws(analysis.strokes[row.stroke], row.stroke, row.mu_rule, analysis.bootstrap)
+        friction = friction_draws(strokes[row.stroke], row.stroke, row.mu_rule, bootstrap)
         draws.append(friction or "the stroke is too short for an interval of its friction")
     return draws
 
@@ -187,17 +187,14 @@ def _extremes(linear: Array, draws: Array) -> Indices:
     return np.unique([np.argsort(values, kind="stable")[ranks] for values in (linear, *(units @ axes.T).T)])
 
 
-def with_alternatives(
-    prediction: SessionPrediction, progress: Progress | None = None, analysis: Analysis | None = None
-) -> SessionPrediction:
+def with_alternatives(prediction: SessionPrediction, progress: Progress | None = None) -> SessionPrediction:
     """Return a prediction with every trial predicted in the variants that its options ask for (`variants`) as well.
 
     Where the options ask for `intervals`, each at small strain has its own, and each at finite strain where they ask
-    for `variant_intervals`; `analysis` is what the friction came from.
-    Raises Cancelled where `progress`, called with the part done, returns False.
+    for `variant_intervals`. Raises Cancelled where `progress`, called with the part done, returns False.
     """
     all_variants, options = tuple(variants(prediction.options.variants)), prediction.options
-    draws = draws_of(analysis, prediction) if all_variants and analysis is not None and options.intervals else None
+    draws = draws_of(prediction) if all_variants and options.intervals else None
     count = len(all_variants)
     columns: list[tuple[Alternative, ...]] = []
     for n, variant in enumerate(all_variants):

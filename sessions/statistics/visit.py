@@ -173,7 +173,7 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
     analysis = analyse(recording, AnalysisSettings(area=options.area, gain_error=gain_error))
     prediction = None
     if recording.plan.forces:
-        prediction = with_intervals(analysis, predict(analysis, recording.plan, options.prediction), both_ways=False)
+        prediction = with_intervals(predict(analysis, recording.plan, options.prediction), both_ways=False)
     paths: Mapping[int, Values] = {}
     if options.paths != "none" and prediction is not None:
         paths = trial_paths(recording, prediction, finite=options.paths == "finite", quantity=BY_NAME[options.quantity])

@@ -19,9 +19,10 @@ from solver.response.nearby import By
 LEVEL = BootstrapSettings(tilt_error=(0.0, 0.0), cross_talk=0.0)
 
 
-def with_bootstrap(analysis, settings):
-    """Return the strokes of an analysis with other settings of the bootstrap."""
-    return SimpleNamespace(strokes=analysis.strokes, bootstrap=settings)
+def drawn_with(settings, prediction, **options):
+    """Return a prediction with intervals from other settings of the bootstrap than its analysis has."""
+    strokes = SimpleNamespace(strokes=prediction.analysis.strokes, bootstrap=settings)
+    return with_intervals(replace(prediction, analysis=strokes), **options)
 
 
 @pytest.fixture(scope="module")
@@ -40,16 +41,16 @@ def prediction(analysis):
 
 
 @pytest.fixture(scope="module")
-def intervals(analysis, prediction):
-    return [row.interval for row in with_intervals(with_bootstrap(analysis, LEVEL), prediction).trials]
+def intervals(prediction):
+    return [row.interval for row in drawn_with(LEVEL, prediction).trials]
 
 
 @pytest.fixture(scope="module")
-def with_variants(analysis, prediction):
+def with_variants(prediction):
     """Return the sticky trial with its variants, and the options."""
     options = replace(prediction.options, variants="small", variant_intervals=True)
     alone = replace(prediction, trials=prediction.trials[:1], options=options)
-    return with_alternatives(with_intervals(analysis, alone), analysis=analysis)
+    return with_alternatives(with_intervals(alone))
 
 
 def seds_of(scenes):
@@ -93,9 +94,9 @@ def test_a_stickier_surface_has_the_wider_interval(intervals):
     assert wide > 3 * narrow > 0
 
 
-def test_twice_the_error_of_calibration_makes_the_interval_nearly_twice_as_wide(analysis, prediction, intervals):
+def test_twice_the_error_of_calibration_makes_the_interval_nearly_twice_as_wide(prediction, intervals):
     alone = replace(prediction, trials=prediction.trials[:1])
-    doubled = with_intervals(with_bootstrap(analysis, replace(LEVEL, gain_error=0.02)), alone).trials[0].interval
+    doubled = drawn_with(replace(LEVEL, gain_error=0.02), alone).trials[0].interval
     assert (doubled.high - doubled.low) / (intervals[0].high - intervals[0].low) == pytest.approx(2.0, rel=0.1)
 
 
@@ -115,37 +116,37 @@ class FormulaSlide:
         return np.array([[np.nan if abs(mu) > 0.03 else self.formula(mu, tau)] * 2 for mu, tau in off])
 
 
-def interval_of(analysis, prediction, monkeypatch, formula, by_mu=0.0, gain_error=0.004):
+def interval_of(prediction, monkeypatch, formula, by_mu=0.0, gain_error=0.004):
     row = prediction.trials[0]
     slide = FormulaSlide(formula, by_mu, row)
     monkeypatch.setattr(uncertainty, "slides", lambda scenes, _=None: iter([slide] * len(scenes)))
     alone = replace(prediction, trials=(row,))
-    return with_intervals(with_bootstrap(analysis, replace(LEVEL, gain_error=gain_error)), alone).trials[0].interval
+    return drawn_with(replace(LEVEL, gain_error=gain_error), alone).trials[0].interval
 
 
-def test_where_the_sed_bends_draws_are_solved_and_missing_states_are_counted(analysis, prediction, monkeypatch):
+def test_where_the_sed_bends_draws_are_solved_and_missing_states_are_counted(prediction, monkeypatch):
     def bent(mu, _):
         return 1.0 + mu**2
 
-    narrow, wide = (interval_of(analysis, prediction, monkeypatch, bent, gain_error=e) for e in (0.004, 0.05))
+    narrow, wide = (interval_of(prediction, monkeypatch, bent, gain_error=e) for e in (0.004, 0.05))
     assert narrow.method == wide.method == "sampling"
     assert prediction.trials[0].sed <= narrow.low < narrow.high
     assert wide.low is None
     assert "have no settled state" in wide.reason
 
 
-def test_what_bends_only_where_both_loads_change_together_is_seen(analysis, prediction, monkeypatch):
+def test_what_bends_only_where_both_loads_change_together_is_seen(prediction, monkeypatch):
     # Straight along mu and along tau_max alone, so that no draw off in one of them would tell.
     def crossed(mu, tau_max):
         return 1.0 + mu + 2000.0 * mu * tau_max
 
-    straight = interval_of(analysis, prediction, monkeypatch, lambda mu, _: 1.0 + mu, by_mu=1.0)
+    straight = interval_of(prediction, monkeypatch, lambda mu, _: 1.0 + mu, by_mu=1.0)
     assert straight.method == "derivatives"
-    assert interval_of(analysis, prediction, monkeypatch, crossed, by_mu=1.0).method == "sampling"
+    assert interval_of(prediction, monkeypatch, crossed, by_mu=1.0).method == "sampling"
 
 
 def test_draws_that_are_solved_give_the_interval_of_all_of_them(analysis, prediction, monkeypatch):
-    interval = interval_of(analysis, prediction, monkeypatch, lambda mu, _: np.exp(60.0 * mu), by_mu=60.0)
+    interval = interval_of(prediction, monkeypatch, lambda mu, _: np.exp(60.0 * mu), by_mu=60.0)
     row = prediction.trials[0]
     mu = friction_draws(analysis.strokes[0], 0, "maximum", replace(LEVEL, gain_error=0.004)).mu
     low, high = row.sed - 1.0 + np.exp(60.0 * (np.quantile(mu, [0.025, 0.975]) - row.mu))
@@ -153,10 +154,10 @@ def test_draws_that_are_solved_give_the_interval_of_all_of_them(analysis, predic
     assert [interval.low, interval.high] == pytest.approx([low, high], abs=0.03 * (high - low))
 
 
-def test_a_trial_without_a_prediction_keeps_its_reason(analysis, prediction):
+def test_a_trial_without_a_prediction_keeps_its_reason(prediction):
     reasons = dict.fromkeys(("sed", "opposite_sed"), "No stroke was found in this trial.")
     row = replace(prediction.trials[0], prediction=None, opposite=None, reasons=reasons)
-    trial = with_intervals(analysis, replace(prediction, trials=(row,))).trials[0]
+    trial = with_intervals(replace(prediction, trials=(row,))).trials[0]
     assert trial.interval.reason == trial.opposite_interval.reason == "No stroke was found in this trial."
     assert trial.interval.low is None
 
@@ -218,7 +219,7 @@ FINITE = PredictionOptions(course="steady", kinematics="finite", intervals=True)
 def test_at_finite_strain_draws_lie_where_the_derivatives_carry_them(number):
     """Against each draw's own solve from nothing, on a mesh of its own."""
     analysis, plan = shallow(ground_truth.visit(1), number)
-    (row,) = with_intervals(with_bootstrap(analysis, LEVEL), predict(analysis, plan, FINITE)).trials
+    (row,) = drawn_with(LEVEL, predict(analysis, plan, FINITE)).trials
     interval, scene = row.interval, row.prediction.scene
     draws = friction_draws(analysis.strokes[0], 0, "maximum", LEVEL)
     mu, tau_max = draws.mu[:60], draws.tau_max[:60]
@@ -237,9 +238,7 @@ def test_intervals_of_200_visits_hold_the_sed_of_the_true_friction(kinematics):
         gains = np.random.default_rng([seed, 9]).normal(1.0, 0.01, 6).tolist()
         visit = ground_truth.visit(seed, BenchSettings(gains=tuple(gains)))
         analysis, plan = shallow(visit, 2)
-        (row,) = with_intervals(
-            with_bootstrap(analysis, LEVEL), predict(analysis, plan, options), both_ways=False
-        ).trials
+        (row,) = drawn_with(LEVEL, predict(analysis, plan, options), both_ways=False).trials
         truth = visit.strokes[1]
         (sed,) = seds_of([with_loads(row.prediction.scene, {"mu": truth.mu, "tau_max": truth.tau_max})])
         hits.append(row.interval.low <= sed <= row.interval.high)
@@ -250,12 +249,12 @@ def test_intervals_of_200_visits_hold_the_sed_of_the_true_friction(kinematics):
 def test_at_finite_strain_no_interval_is_told_where_draws_or_all_have_no_settled_slide():
     analysis, plan = shallow(ground_truth.visit(1), 2)
     beyond = predict(analysis, plan, replace(FINITE, indentation=2.0))
-    (row,) = with_intervals(analysis, beyond).trials
+    (row,) = with_intervals(beyond).trials
     assert row.interval.low is None
     assert row.interval.reason == row.reasons["sed"]
     assert "settled sliding up to mu = 0.3" in row.interval.reason
     near = predict(analysis, plan, replace(FINITE, indentation=1.82))  # of at most 1.83 mm with the friction found
-    (row,) = with_intervals(analysis, near).trials
+    (row,) = with_intervals(near).trials
     assert row.interval.low is None
     assert "of 60 draws of the friction have no settled state" in row.interval.reason
     largest = int(np.argmax(friction_draws(analysis.strokes[0], 0, "maximum").mu))
