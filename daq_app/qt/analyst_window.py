@@ -121,16 +121,18 @@ class AnalystWindow(QMainWindow):
         self.setCentralWidget(self._lay_out())
         self._place_columns()
         self._timer = QTimer(self)
-        self._timer.timeout.connect(self._look)
+        self._timer.timeout.connect(lambda: self.take(*self._work.poll()))
         self._timer.start(_LOOK)
         self._show()
 
     def sizeHint(self) -> QSize:
         return QSize(1440, 860)
 
-    def take(self, message: m.Message) -> None:
-        self.state = fold(self.state, message)
-        self._show()
+    def take(self, *messages: m.Message) -> None:
+        for message in messages:
+            self.state = fold(self.state, message)
+        if messages:
+            self._show()
 
     def ask(self, request: m.Ask) -> None:
         if isinstance(request, m.Choose) and request.row == self.state.row:
@@ -185,13 +187,6 @@ class AnalystWindow(QMainWindow):
     def _go_to(self, column: int) -> None:
         self._pages.setCurrentIndex(column)
         (self.trials.list, self.stroke.stroke.handles["onset"], self.model.tabs)[column].setFocus()
-
-    def _look(self) -> None:
-        messages = self._work.poll()
-        for message in messages:
-            self.state = fold(self.state, message)
-        if messages:
-            self._show()
 
     def write_report(self) -> None:
         name, _ = QFileDialog.getSaveFileName(self, tr("Report"), str(self.state.folder / "report.html"), "*.html")

@@ -62,13 +62,13 @@ class CutShort(Panel):
 
     def __init__(self, send: Callable[[Message], None]) -> None:
         super().__init__("", "banner")
-        self._send = send
         self._items: tuple[UnfinishedSession, ...] = ()
         self.setProperty("grade", "look")
         self._sessions = choice(tr("sessions that were cut short"))
         self._description = label("", wrap=True)  # whole, however narrow the list is
         self._sessions.currentTextChanged.connect(partial(set_text, self._description))
-        self.go_on = button(tr("Go on with it"), tr("go on with the session that was cut short"), self._resume)
+        name = tr("go on with the session that was cut short")
+        self.go_on = button(tr("Go on with it"), name, lambda: send(ResumeSession(self._sessions.currentData())))
         heading = label(tr("▲ Sessions that were cut short"), wrap=True)
         fill(QVBoxLayout(self), heading, self._sessions, self._description, self.go_on)
         self._new_list.connect(self.show_sessions, Qt.ConnectionType.QueuedConnection)
@@ -94,10 +94,6 @@ class CutShort(Panel):
                 self._sessions.setItemData(index, str(session.folder), Qt.ItemDataRole.ToolTipRole)
         self._sessions.setVisible(len(sessions) > 1)
         self.setVisible(bool(sessions))
-
-    def _resume(self) -> None:
-        if folder := self._sessions.currentData():
-            self._send(ResumeSession(str(folder)))
 
 
 class TransducerRow(QWidget):

@@ -30,7 +30,6 @@ from daq_app.window.new_session import Bench, Refusal, SessionForm, bench_of, ch
 from daq_app.window.view import View
 from daq_app.window.view_course import Button
 from daq_app.wording import tr
-from sessions.run import steps
 
 _COURSE = frozenset({"primary", *ACTS})  # of the session in hand
 # Before the scale of the fonts [px]:
@@ -126,7 +125,7 @@ class MainWindow(QMainWindow):
     def _table(self) -> dict[str, Callable[[], object]]:
         return {
             "primary": self._primary,
-            "undo": self._undo,
+            "undo": lambda: self.rooms.room == "run" and self.course.ask("undo"),
             "new": lambda: self.rooms.session_over and self.go_to("prepare"),
             "tare": lambda: self.bridge.view.bench.can_tare and self.bridge.send(Tare()),
             "connect": self.bench.connect_choice,
@@ -197,11 +196,6 @@ class MainWindow(QMainWindow):
             self._start_session()
         elif course.primary is not None and course.primary.sends is not None:
             self.bridge.send(course.primary.sends)
-
-    def _undo(self) -> None:
-        course = self.bridge.view.course
-        if course is not None and course.buttons["undo"].enabled and self.rooms.room == "run":
-            self.bridge.send(steps.UndoRedo())
 
     def _start_session(self) -> None:
         bench = bench_of(self.bridge.state.bench)

@@ -19,7 +19,6 @@ from daq_app.tablet.dialogue import AnswerGiven, Dialogue, Force, FromTablet, He
 from daq_app.tablet.server import TabletServer, own_address
 from daq_app.window.course_state import SessionState
 from daq_app.window.live_trace import LiveTrace
-from daq_app.window.state import Message
 from daq_app.window.subject import LENGTH, SubjectView, translator
 from daq_app.window.view import View
 from daq_app.wording import tr
@@ -122,7 +121,8 @@ class SubjectSide(QObject):
         self._subject, self._tablet = subject, tablet
         self.keyboard = Keyboard(window, course.plan, subject, act)
         self.keyboard.free.connect(self._bring)
-        subject.answered.connect(self._send_answer)
+        subject.answered.connect(bridge.send)
+        subject.answered.connect(self._let_go)
         subject.ruler.finished.connect(lambda: subject.scoring or self.come_back())
         subject.screen_changed.connect(self.line_changed)
         if tablet is not None:
@@ -202,10 +202,6 @@ class SubjectSide(QObject):
     def _with_people(self) -> bool:
         session = self._bridge.state.session
         return session is not None and session.people != "simulated people"
-
-    def _send_answer(self, event: Message) -> None:
-        self._bridge.send(event)
-        self._let_go()
 
     def _let_go(self) -> None:
         """Give the keyboard back once no answer is due, unless it is another window's."""

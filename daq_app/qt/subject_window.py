@@ -57,7 +57,8 @@ class SubjectWindow(QWidget):
         self.next.setMinimumSize(px(180), px(64))
         self.ruler = RulerCheck()
         self.ruler.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # its words are the experimenter's
-        self.ruler.finished.connect(self._end_ruler_check)
+        self.ruler.finished.connect(self._screen_changed)
+        self.ruler.finished.connect(self._turn)
         self._pages = stack_pages(self._message_page(), self._scale_page(), self.ruler)
         vbox(self._pages, on=self)
         for answer_field in (self.line, self.number, self.choice):
@@ -223,10 +224,6 @@ class SubjectWindow(QWidget):
         self._pages.setCurrentIndex(1 if self.scoring else 0)
         if self.scoring:
             self._answer_field.setFocus()
-
-    def _end_ruler_check(self) -> None:
-        self._screen_changed()
-        self._turn()
 
     def _answer_changed(self) -> None:
         self.next.setVisible(self._answer_field.answered)

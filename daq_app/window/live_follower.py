@@ -8,7 +8,6 @@ whole tangential force is taken to act along the finger, in the sense of its par
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Self
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from solver import Friction, Loading, Scene, Solve, SolveFailure, solve
 from solver.arrays import Array, Indices
 from solver.prediction import ROW, Prediction, percent
 from solver.response.fields import fields_of
-from solver.response.stepper import LivePicture, Stepper, stepper
+from solver.response.stepper import LivePicture, stepper
 
 TOUCH = 0.05  # less normal force is no touch [N]
 _FLOOR = RatioSettings().force_floor  # a ratio means nothing below this normal force [N]
@@ -67,17 +66,11 @@ class _Observation:
     depth: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class _Model:
-    stepper: Stepper
-    picture: LivePicture
-
-    @classmethod
-    def from_scene(cls, scene: Scene) -> Self:
-        follower = stepper(scene)
-        picture = LivePicture(follower.finger)
-        picture.sed(follower.state)  # what it needs is made at once
-        return cls(follower, picture)
+    def __init__(self, scene: Scene) -> None:
+        self.stepper = stepper(scene)
+        self.picture = LivePicture(self.stepper.finger)
+        self.picture.sed(self.stepper.state)  # what it needs is made at once
 
     def picture_and_rest(self) -> tuple[Picture, Array]:
         """Return the picture, and the positions of its nodes while nothing touches (n, 2) [mm]."""
@@ -99,7 +92,7 @@ class Follower:
         self._kinematics: Kinematics = use.kinematics
         self._scene = scene
         finite = (live_scene(use.plan, "finite"),) if use.kinematics == "finite" else ()
-        self._models = [*map(_Model.from_scene, (scene, *finite))]  # at small strain, and at finite strain
+        self._models = [*map(_Model, (scene, *finite))]  # at small strain, and at finite strain
         self._reached = False  # by finite strain, at the last step
         self._mu, self._tangential = LEAST_MU, 0.0
         self._stream: int | None = None
