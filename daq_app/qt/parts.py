@@ -292,7 +292,7 @@ def entry(name: str, empty: str = "") -> QLineEdit:
 class Openness:
     """Whether a part is open, remembered under a `key` where there is room for the part and its neighbour.
 
-    Where there is none it begins closed, and opening it is not remembered. `place` is called when it has changed.
+    Where there is none it begins closed, and opening it is not remembered. `on_change` is called when it has changed.
     """
 
     def __init__(self, key: str, on_change: Callable[[], object]) -> None:
