@@ -100,14 +100,15 @@ def number(value: float | None, digits: int = 3, *, factor: float = 1.0) -> str:
 
     Of numbers below a million all digits before the point are there.
 
-    >>> number(0.0052573, 3), number(None), number(0.012, factor=1e3), number(1423.4, 2), number(99.96, 2)
-    ('0.00526', '–', '12.0', '1,423', '100')
+    >>> number(0.0052573, 3), number(None), number(0.012, factor=1e3), number(-1423.4, 2), number(99.96, 2)
+    ('0.00526', '–', '12.0', '−1,423', '100')
     """
     if value is None or not isfinite(value):
         return "–"
     value *= factor
-    text = f"{value:#.{digits}g}".rstrip(".")
-    return f"{value:,.0f}" if 10.0**digits <= abs(float(text)) < 1e6 else text
+    text = f"{abs(value):#.{digits}g}".rstrip(".")
+    text = f"{abs(value):,.0f}" if 10.0**digits <= float(text) < 1e6 else text
+    return f"−{text}" if value < 0.0 else text
 
 
 def typed_number(text: str, point: str = ".") -> float | None:
@@ -141,7 +142,7 @@ def span(low: float, high: float, digits: int = 3) -> str:
     """Return a range with `digits` significant digits, and more where its ends would read alike.
 
     >>> span(1.0, 2.5), span(-178.94, -178.91), span(2.0, 2.0)
-    ('1.00 to 2.50', '-178.94 to -178.91', '2.00 to 2.00')
+    ('1.00 to 2.50', '−178.94 to −178.91', '2.00 to 2.00')
     """
     while low != high and digits < _MOST_DIGITS and number(low, digits) == number(high, digits):
         digits += 1

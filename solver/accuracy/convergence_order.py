@@ -10,6 +10,7 @@ not resolve a fold: the corner counts. Where more do, the cut folds. Nothing set
 meshes come to others, and no error is known.
 """
 
+from collections.abc import Iterator
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any
@@ -21,6 +22,7 @@ from solver.continuation import folds_at
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import Finger, FiniteFinger, finite_laws, settled_moduli
 from solver.failures import cut_folds
+from solver.prediction import percent
 from solver.scene import Scene
 from solver.scene.tables import TISSUES, Materials
 
@@ -74,20 +76,26 @@ def _folding_stretches(materials: Materials) -> Array:
 
 _ROUND_OFF = 1e-12  # relative, of a stiffness
 TRIED_RATIO = 100.0  # largest ratio of stiffnesses of neighbouring tissues in the trials where estimates hold [-]
+TRIED_DEPTH = 0.5  # deepest presses at finite strain in those trials, by the thickness of the tissue [-]
 
 
-def stiffness_warning(scene: Scene) -> str:
-    """Return a warning where neighbouring tissues differ more in stiffness than in trials of the estimates, else "".
+def trial_warnings(scene: Scene, depth: float) -> Iterator[str]:
+    """Yield a warning for each way in which a scene, pressed to a `depth` [mm], exceeds the trials of the estimates.
 
     Tissues are relaxed, as in the answer.
     """
     ratio, stiff, soft = _stiffness_ratio(scene.materials)
-    if ratio <= TRIED_RATIO:
-        return ""
-    return (
-        f"The {stiff} is {float(f'{ratio:.2g}'):,.0f} times as stiff as the {soft}. Error estimates hold in trials up "
-        f"to {TRIED_RATIO:.0f} times; beyond, errors of up to twice the estimate were seen."
-    )
+    if ratio > TRIED_RATIO:
+        yield (
+            f"The {stiff} is {float(f'{ratio:.2g}'):,.0f} times as stiff as the {soft}. Error estimates hold in trials "
+            f"up to {TRIED_RATIO:.0f} times; beyond, errors of up to twice the estimate were seen."
+        )
+    part = depth / scene.finger.pulp_thickness()
+    if scene.solve.kinematics == "finite" and part > TRIED_DEPTH:
+        yield (
+            f"The finger is pressed by {percent(part)} of its tissue. Error estimates hold in trials up to "
+            f"{percent(TRIED_DEPTH)}; beyond, errors of up to five times the estimate were seen."
+        )
 
 
 @lru_cache(maxsize=32)

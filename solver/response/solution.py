@@ -8,7 +8,7 @@ import numpy as np
 
 from solver._kernels.contact_system import STEEP
 from solver.accuracy.adaptivity import refine_lines
-from solver.accuracy.convergence_order import stiffness_warning
+from solver.accuracy.convergence_order import trial_warnings
 from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error
 from solver.accuracy.omitted_effects import COARSE, Answers, measure_differences
 from solver.accuracy.residual_overstress import with_viscosity
@@ -330,8 +330,8 @@ def _sentences(
         warnings.append(f"How far this is off is not known, since {answer.unknown}.")
     elif error > 1.0 and isinstance(answer, Prediction) and answer.scene.solve.tolerance is not None:
         warnings.append(TOLERANCE_MISSED)
-    if isinstance(answer, Prediction) and (doubt := stiffness_warning(answer.scene)):
-        warnings.append(doubt)
+    if isinstance(answer, Prediction):
+        warnings += trial_warnings(answer.scene, answer.indentation)
     if contrast is not None and contrast.warning:
         warnings.append(contrast.warning)
     return tuple(warnings)

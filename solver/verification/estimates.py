@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.accuracy.convergence_order import stiffness_warning
+from solver.accuracy.convergence_order import trial_warnings
 from solver.failures import SolveFailure
 from solver.prediction import Prediction, percent
 from solver.response.solution import solve, solve_many
@@ -137,7 +137,7 @@ def compare(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.n
     """
     if answer.nested is None:
         return []
-    best, warned = answer.sed_ending_corrected, bool(stiffness_warning(answer.scene))
+    best, warned = answer.sed_ending_corrected, any(trial_warnings(answer.scene, answer.indentation))
     numbers = (  # place in the truth, value and estimate of each of `GOALS`
         (0, answer.sed_ending, answer.error_estimate),
         (0, best, answer.corrected_error),

@@ -43,6 +43,7 @@ def test_a_deep_press_without_friction_has_an_error_estimate_that_holds_for_a_fi
     fine = FiniteFinger.of(scene, Sizing(8.0, 3.3, margin=3.0))
     *_, pressed = march(fine.newton, [LoadState(depth, 0.0) for depth in np.linspace(0.1, 3.3, 33).tolist()])
     assert answer.error_estimate < 0.1
+    assert any("pressed by 70 % of its tissue" in warning for warning in answer.warnings)
     assert answer.sed_ending == pytest.approx(fine.sed_ending(pressed.u), rel=answer.error_estimate)
 
 

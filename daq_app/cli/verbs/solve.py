@@ -2,12 +2,12 @@
 
 import argparse
 from dataclasses import replace
-from math import isfinite
+from math import floor, inf, isfinite, log10
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq_app.console import DONE, FLAWED, STOPPED, Console, WrongValue, table
-from daq_app.wording import number
+from daq_app.wording import number, quantity
 from solver.quantities import NAMES, QUANTITIES, SED
 
 if TYPE_CHECKING:
@@ -18,10 +18,11 @@ if TYPE_CHECKING:
 
 EXAMPLE = "daq-app solve stickiness-100.toml --json"
 UNFINISHED = "Stopped before all that was asked for was done: this is what had been found by then."
-_UNITS = [("" if unit == "1" else unit, factor) for unit, factor in (quantity.shown_unit for quantity in QUANTITIES)]
+_UNITS = [("" if unit == "1" else unit, factor) for unit, factor in (response.shown_unit for response in QUANTITIES)]
 # What a course gives beside the quantities, and the units of both.
 _COURSE = ("SED at the ending", "SED at the point", "normal force", "tangential force", "contact width")
 COURSE_UNITS = [SED.shown_unit, SED.shown_unit, ("N/mm", 1.0), ("N/mm", 1.0), ("mm", 1.0), *_UNITS]
+_EXACT = 1e-9  # relative error below which a number was given, and not solved for
 AUDITS = {
     "equilibrium_x": "forces along the surface are out of balance by",
     "equilibrium_y": "forces across the surface are out of balance by",
@@ -113,8 +114,8 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
     console.say(table(rows, header=["", "", "", "error, estimated"]))
     console.say("\nEvery quantity at the ending, averaged over it (--json says what each is):")
     responses = [
-        [quantity.label, _with_error(*prediction.responses[quantity.name], factor), unit]
-        for quantity, (unit, factor) in zip(QUANTITIES, _UNITS, strict=True)
+        [response.label, _with_error(*prediction.responses[response.name], factor), unit]
+        for response, (unit, factor) in zip(QUANTITIES, _UNITS, strict=True)
     ]
     console.say(table(responses, header=["", "", ""]).lstrip("\n"))
     if course is not None:
@@ -126,7 +127,7 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
             for pairs in zip(row.values.T, row.errors.T, strict=True)
         ]
         lines = [[number(arc, 4), *line] for arc, line in zip(ROW.tolist(), cells, strict=True)]
-        console.say(table(lines, header=["arc [mm]", *(quantity.label for quantity in QUANTITIES)]).lstrip("\n"))
+        console.say(table(lines, header=["arc [mm]", *(response.label for response in QUANTITIES)]).lstrip("\n"))
     effects = [[name, _percent(entry["estimate"])] for name, entry in prediction.model["left_out"].items()]
     console.say(
         "\nLeft out of the model, and what of the SED that is estimated to have changed (--json says how it was found):"
@@ -161,7 +162,7 @@ def _course_in_json(numbers: "CourseNumbers", errors: "CourseNumbers") -> dict[s
 
 
 def _print_course(numbers: "CourseNumbers", errors: "CourseNumbers", console: Console) -> None:
-    labels = [*_COURSE, *(quantity.label for quantity in QUANTITIES)]
+    labels = [*_COURSE, *(response.label for response in QUANTITIES)]
     instants_title = "At the ends of the press, of the break-away (full slip) and of the slide:"
     rates_title = "Mean rates in the press, the break-away and the slide:"
     sections = (
@@ -187,7 +188,11 @@ def _plain(table: "Array") -> list[list[float | None]]:
 
 
 def _with_error(value: float, error: float, factor: float) -> str:
-    return f"{number(value, 4, factor=factor)} ± {number(error, 2, factor=factor)}" if isfinite(value) else "–"
+    """Return a number times `factor` with two digits of its error, or with four where that is round-off or unknown."""
+    if not _EXACT * abs(value) < error < inf:
+        return f"{number(value, 4, factor=factor)} ± {number(error, 2, factor=factor)}" if isfinite(value) else "–"
+    decimals = max(0, 1 - floor(log10(factor * error)))
+    return f"{quantity(factor * value, decimals)} ± {quantity(factor * error, decimals)}"
 
 
 def _row_in_json(row: "Row") -> dict[str, object]:
