@@ -59,7 +59,6 @@ class Bridge(QObject):
         self.model = LiveModel()
         self.session_offset = 0.0  # session clock minus this machine's [s]
         self._timer = QTimer(self)
-        self._timer.setInterval(_FRAME)
         self._timer.timeout.connect(self.poll)
 
     @property
@@ -71,7 +70,7 @@ class Bridge(QObject):
         self._fold(m.Connect(uri))
 
     def begin(self) -> None:
-        self._timer.start()
+        self._timer.start(_FRAME)
         QTimer.singleShot(AFTER_OPENING, self._judge.prepare)
         QTimer.singleShot(AFTER_OPENING, self.model.prepare)
 

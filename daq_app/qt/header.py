@@ -37,7 +37,6 @@ class Header(QWidget):
             wrapped.setSizePolicy(policy)
         self._device.setMinimumHeight(px(TWO_LINES))  # what is below stays in place when the device says more
         self._simulated = label(tr("SIMULATED"), "simulated")
-        self._simulated.setVisible(False)
         self._lamp = Lamp(tr("recording"))
         self._recording_label = label(tr("not recording"), "title")
         self._age = label("", "quiet")
@@ -132,7 +131,6 @@ class ToDo(Panel):
         self.sentence.setMinimumHeight(_LEAST)
         self.primary = button("", tr("do it"), primary, "primary")
         self.second = button(tr("Review  F4"), tr("look at the session that has ended"), review)
-        self.second.hide()
         policy = self.primary.sizePolicy()
         policy.setRetainSizeWhenHidden(True)
         self.primary.setSizePolicy(policy)

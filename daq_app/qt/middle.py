@@ -148,7 +148,6 @@ class Middle(QWidget):
         self.stroke = WrappedLabel("value", keeps_room=True)
         self.redo = button(tr("Redo  R"), tr("redo the last stroke"), lambda: act("redo"))
         self.undo = button("", tr("undo the last redo"), lambda: act("undo"))
-        self.undo.hide()
         frame = Panel(tr("inspected trial"))
         vbox(scroll_area(self.trial), on=frame, margins=(2 * GRID, int(1.5 * GRID), 2 * GRID, int(1.5 * GRID)))
         self._pages = stack_pages(self.live, frame)

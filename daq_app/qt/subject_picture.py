@@ -77,7 +77,6 @@ class Thumbnail(SubjectPicture):
         super().__init__(QSize(1000, 640))
         self._source: object = None  # what the picture was drawn from
         self.setFixedHeight(px(THUMBNAIL_HEIGHT, most=1.4))
-        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
     def show_form(self, form: SessionForm, size: QSize) -> None:
         source = form.protocol, form.study, form.folder, form.language, size
@@ -122,7 +121,6 @@ class Mirror(QWidget):
         if self.picture is None:
             self.picture = SubjectPicture(self._size)
             self.picture.setFixedHeight(px(MIRROR_HEIGHT, most=1.4))
-            self.picture.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             self.layout().addWidget(self.picture)  # pyrefly: ignore[missing-attribute]  it was set above
         self.picture.show_page(self._view, self._size)
 

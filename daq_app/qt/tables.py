@@ -14,7 +14,7 @@ from PySide6.QtCore import (
     Signal,
 )
 from PySide6.QtGui import QFont, QGuiApplication, QKeyEvent, QKeySequence, QShowEvent, QStandardItem, QStandardItemModel
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QTableView, QWidget
 
 from daq_app.analyst.stroke import RawReadings
 from daq_app.qt.parts import WrappedLabel, vbox
@@ -34,7 +34,6 @@ class CopyableTable(QTableView):
         self.setAccessibleName(name)
         self.setTabKeyNavigation(False)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.verticalHeader().hide()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -122,7 +121,6 @@ class ReadingsTable(QWidget):
         self.caption = WrappedLabel("quiet")
         self.table = CopyableTable(tr("raw readings"))  # in the order in which they came
         self.table.setSelectionBehavior(QTableView.SelectionBehavior.SelectRows)
-        self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
         self._model = _Model()
         self.table.setModel(self._model)
         vbox(self.caption, (self.table, 1), on=self)
