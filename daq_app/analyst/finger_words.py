@@ -1,10 +1,10 @@
-"""Texts and colour range of the displayed finger, and the comparison of two sessions."""
+"""Texts of the displayed finger, and the comparison of two sessions."""
 
 from collections import defaultdict
 from statistics import fmean
 
 from daq_app.analyst import state as m
-from daq_app.analyst.frame import FieldChoice, Frame, Range, automatic_range
+from daq_app.analyst.frame import Frame
 from daq_app.analyst.session_words import greatest_errors, sed_text
 from daq_app.analyst.state import AnalystState, selected_row
 from daq_app.wording import errors_text, tr, tr_noop
@@ -44,18 +44,6 @@ def _numbers(report: Report) -> dict[tuple[str, int], dict[str, float]]:
         for score in experiment.scores:
             samples[experiment.name, score.index]["score"].append(score.mean)
     return {key: {name: fmean(sample) for name, sample in values.items()} for key, values in samples.items()}
-
-
-def common_range(state: AnalystState, field: FieldChoice) -> Range:
-    """Return where the colours of all trials of a session, and of one compared with it, begin and end."""
-    compared_fingers = () if state.comparison is None else state.comparison.fingers.values()
-    return automatic_range(field, (*state.fingers.values(), *compared_fingers))
-
-
-def visible_film(state: AnalystState) -> m.FingerHistory | None:
-    """Return the history that was asked for, where it is that of the chosen trial."""
-    row = selected_row(state)
-    return state.film if row is not None and state.film is not None and state.film.key == row.key else None
 
 
 def finger_text(state: AnalystState) -> str:

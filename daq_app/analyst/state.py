@@ -8,7 +8,7 @@ from typing import Literal
 import msgspec
 from msgspec import Struct
 
-from daq_app.analyst.frame import Film, Frame
+from daq_app.analyst.frame import FieldChoice, Film, Frame, Range, automatic_range
 from daq_app.analyst.stroke import Edge, History, RawReadings
 from daq_app.wording import tr, tr_noop
 from sessions.prediction import SED
@@ -196,6 +196,17 @@ class AnalystState:
     halted: bool = False  # somebody stopped the model's answers
     row: int = 0  # that is chosen
     response: str = SED.name  # the quantity at the ending that is held against the scores
+
+    @property
+    def visible_film(self) -> FingerHistory | None:
+        """Return the history that was asked for, where it is that of the chosen trial."""
+        row = selected_row(self)
+        return self.film if row is not None and self.film is not None and self.film.key == row.key else None
+
+    def common_range(self, choice: FieldChoice) -> Range:
+        """Return where the colours of all trials of the session, and of one compared with it, begin and end."""
+        compared_fingers = () if self.comparison is None else self.comparison.fingers.values()
+        return automatic_range(choice, (*self.fingers.values(), *compared_fingers))
 
 
 @dataclass(frozen=True, slots=True)

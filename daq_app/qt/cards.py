@@ -11,7 +11,7 @@ from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from daq_app.qt.bench_panel import show_connecting
-from daq_app.qt.parts import Panel, button, choice, field, fill, hbox, label, regrade, set_text, vbox
+from daq_app.qt.parts import Panel, Part, button, choice, field, fill, hbox, label, regrade, set_text, vbox
 from daq_app.qt.preferences import Millimetres, name_of
 from daq_app.qt.subject_picture import Thumbnail
 from daq_app.qt.tokens import GRID, missing_glyphs
@@ -26,7 +26,7 @@ from sessions.plan.protocols.protocol import ENGLISH
 
 
 class CardFrame(Panel):
-    """Holds the fields of a card in `body`."""
+    """Holds the fields of a card."""
 
     def __init__(self, name: str) -> None:
         super().__init__("", "card")
@@ -34,10 +34,12 @@ class CardFrame(Panel):
         self._card: Card | None = None
         self._mark = label("○")
         self.message = label("", "quiet", wrap=True)
-        self.body = QVBoxLayout()
-        self.body.setSpacing(4)
+        self._fields = vbox(spacing=4)
         header = hbox(self._mark, (label(tr(name), "name", wrap=True), 1), spacing=GRID)
-        vbox(header, self.message, self.body, on=self, margins=GRID, spacing=4)
+        vbox(header, self.message, self._fields, on=self, margins=GRID, spacing=4)
+
+    def add(self, *fields: Part) -> None:
+        fill(self._fields, *fields)
 
     def show_card(self, card: Card) -> None:
         """Show whether the card is ready, and its line; nobody is blamed before Start was asked for."""

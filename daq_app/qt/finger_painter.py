@@ -8,7 +8,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 
 from daq_app.analyst.frame import Box, FieldChoice, Frame, Line, Range, View, halve_triangles, visible
-from daq_app.qt.painting import paint_faces, paint_failed_solve, sheer
+from daq_app.qt.painting import fill_faces, mark_failed_solve, sheer
 from daq_app.qt.tokens import Tokens
 from daq_app.wording import tr, tr_noop
 from drivers.arrays import Array
@@ -69,7 +69,7 @@ class FingerPainter:
         painter.drawLine(QPointF(box.left(), ground), QPointF(box.right(), ground))
         self._paint_contact(ground)
         if look.lost is not None:
-            paint_failed_solve(painter, self._to_screen(np.array([look.lost]))[0], self.tokens)
+            mark_failed_solve(painter, self._to_screen(np.array([look.lost]))[0], self.tokens)
         if line is not None:
             self._paint_line(line)
         painter.restore()
@@ -87,7 +87,7 @@ class FingerPainter:
             nodes, values, triangles = halve_triangles(nodes, values, triangles)
         low, high = look.range
         fraction = (values[triangles].mean(axis=1) - low) / (high - low)
-        paint_faces(self.painter, self.view.to_screen(nodes)[triangles], fraction, shades, edges=True)
+        fill_faces(self.painter, self.view.to_screen(nodes)[triangles], fraction, shades, edges=True)
 
     def _paint_mesh(self) -> None:
         self.painter.setPen(QPen(sheer("black", 110), 0.6))

@@ -6,16 +6,7 @@ from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QP
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from daq_app.analyst.frame import View
-from daq_app.qt.painting import (
-    PaintedWidget,
-    blank,
-    draw_line,
-    fine,
-    lines,
-    paint_arrow,
-    paint_faces,
-    paint_failed_solve,
-)
+from daq_app.qt.painting import PaintedWidget, blank, draw_line, fill_faces, fine, lines, mark_failed_solve, paint_arrow
 from daq_app.qt.tokens import MODEL, MU, SMALL, font, theme_of
 from daq_app.window.live_model import ModelText, Picture
 from daq_app.window.live_trace import PlotScale
@@ -201,12 +192,12 @@ class FingerView(QWidget):
         picture = self._picture
         if picture is not None:
             corners = view.to_screen(picture.nodes)[picture.faces]
-            paint_faces(painter, corners, 1000.0 * picture.sed / self._colours.high, [*map(QColor, MAGMA)])
+            fill_faces(painter, corners, 1000.0 * picture.sed / self._colours.high, [*map(QColor, MAGMA)])
             style = Qt.PenStyle.SolidLine if self._text.state == "settled" else Qt.PenStyle.DashLine
             painter.setPen(fine(t.text, style))
             draw_line(painter, *view.to_screen(picture.outline).T)
             if picture.lost is not None:
-                paint_failed_solve(painter, QPointF(*view.to_screen(np.array([picture.lost]))[0].tolist()), t)
+                mark_failed_solve(painter, QPointF(*view.to_screen(np.array([picture.lost]))[0].tolist()), t)
         painter.restore()
         painter.setPen(QColor(t.quiet))
         painter.drawText(box.adjusted(4, 0, -4, -2), TOP_RIGHT, tr("0 to {high:g} kPa", high=self._colours.high))

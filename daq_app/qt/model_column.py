@@ -7,15 +7,7 @@ from pathlib import Path
 from PySide6.QtWidgets import QFileDialog, QTabWidget, QWidget
 
 from daq_app.analyst import state as m
-from daq_app.analyst.finger_words import (
-    common_range,
-    compare_reports,
-    film_text,
-    finger_text,
-    name_and_errors,
-    other_finger,
-    visible_film,
-)
+from daq_app.analyst.finger_words import compare_reports, film_text, finger_text, name_and_errors, other_finger
 from daq_app.analyst.frame import FIELD_ERRORS, automatic_range
 from daq_app.analyst.session_words import picture_errors, scene_table, session_pictures
 from daq_app.analyst.state import AnalystState, Row, selected_row
@@ -95,7 +87,7 @@ class ModelColumn(QWidget):
 
     def show_state(self, state: AnalystState) -> None:
         previous, self._state = self._state, state
-        film = visible_film(state)
+        film = state.visible_film
         if film is not self._film:
             self._film = film
             self._index = None if film is None else len(film.film.instants) - 1
@@ -160,7 +152,7 @@ class ModelColumn(QWidget):
         present = tuple(frame for frame in (finger, second) if frame is not None)
         frames = tuple(film.film.frames) if film is not None and self._filming else present
         own_range = automatic_range(field, frames)  # of a film that is written: the same for all of it
-        common = common_range(state, field)
+        common = state.common_range(field)
         colour_range = own_range if self.fields.mode == OWN or (lost and own_range[1] > common[1]) else common
         look = Look(field, self.fields.range(colour_range), self.near.isChecked(), self.mesh.isChecked(), lost)
         pair = ((self.finger, finger, f"A  {text}"), (self.compared_finger, second, f"B  {second_text}"))

@@ -7,32 +7,10 @@ from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QComboBox, QCompleter, QFileDialog, QRadioButton, QWidget
 
 from daq_app.qt.cards import CardFrame, CutShort, ScreenFields, TransducerRow
-from daq_app.qt.parts import (
-    Panel,
-    button,
-    choice,
-    entry,
-    field,
-    fill,
-    hbox,
-    label,
-    scroll_area,
-    set_horizontal,
-    set_text,
-    tick,
-    vbox,
-)
+from daq_app.qt.parts import Panel, button, choice, entry, field, hbox, label, scroll_area, set_horizontal, tick, vbox
 from daq_app.qt.tokens import GRID, TARGET, px
 from daq_app.window.checklist import CARD_FIELDS, Card, checklist, codes_in, next_code, studies_in
-from daq_app.window.new_session import (
-    Bench,
-    SessionForm,
-    enrol_subject,
-    enrolment,
-    folder_of,
-    optional_phases,
-    place_of,
-)
+from daq_app.window.new_session import Bench, SessionForm, enrol_subject, enrolment, optional_phases
 from daq_app.window.state import LanguageChosen, Message
 from daq_app.wording import tr, tr_noop
 from sessions.plan.plan import NORMALS, Hand
@@ -157,7 +135,7 @@ class NewSessionPage(Panel):
             text = tr("A simulated hand strokes when asked; you mount, and you or a subject score.")
         elif self.scores_only.isChecked():
             text = tr("The subject strokes and scores; no forces are recorded.")
-        set_text(self._people_words, text)
+        self._people_words.setText(text)
         may = bench.simulated or self.scores_only.isChecked() or not bench.connected
         self.simulated.setEnabled(may)
         if not may and self.simulated.isChecked():
@@ -184,7 +162,7 @@ class NewSessionPage(Panel):
             first.setFocus()
 
     def look_for_unfinished_sessions(self) -> None:
-        self.cut_short.look_in(folder_of(self.form()))
+        self.cut_short.look_in(self.form().root_folder)
 
     def _show_study(self) -> None:
         """Show what the study says of the subject: its protocol and its orders were decided when it was made."""
@@ -226,14 +204,14 @@ class NewSessionPage(Panel):
             self.changed.emit()
 
     def _choose_folder(self) -> None:
-        name = QFileDialog.getExistingDirectory(self, tr("Folder of sessions"), str(folder_of(self.form()).absolute()))
+        name = QFileDialog.getExistingDirectory(self, tr("Folder of sessions"), str(self.form().root_folder.absolute()))
         if name:
             self.folder.setText(name)
             self.look_for_unfinished_sessions()
 
     def _place_changed(self) -> None:
         """Offer the studies of the folder, and the code after those that were there."""
-        names = ["", *studies_in(folder_of(self.form()))]
+        names = ["", *studies_in(self.form().root_folder)]
         if names != [self.studies.itemText(index) for index in range(self.studies.count())]:
             with QSignalBlocker(self.study):  # what stands in the field stays
                 typed = self.study.text()
@@ -242,7 +220,7 @@ class NewSessionPage(Panel):
                 self.studies.setEditText(typed)
             if (completer := self.studies.completer()) is not None:  # as an editable list has
                 completer.setCompletionMode(QCompleter.CompletionMode.PopupCompletion)
-        code = next_code(codes_in(place_of(self.form())))
+        code = next_code(codes_in(self.form().parent_folder))
         self.subject.setPlaceholderText(tr("e.g. {code}", code=code))
         self._proposal.setText(code)
 
@@ -279,7 +257,7 @@ class NewSessionPage(Panel):
             },
         )
         for name, widgets in (columns[0] | columns[1]).items():
-            fill(self.frames[name].body, *widgets)
+            self.frames[name].add(*widgets)
         left, right = (vbox(*(self.frames[name] for name in names), 1, spacing=GRID) for names in columns)
         self._columns = vbox((left, 1), (right, 1))
         inside = QWidget()

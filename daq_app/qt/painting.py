@@ -105,7 +105,7 @@ def faces(corners: Array, shades: Indices) -> Iterator[tuple[int, QPainterPath]]
         yield int(sorted_shades[begin]), path
 
 
-def paint_faces(
+def fill_faces(
     painter: QPainter, corners: Array, fraction: Array, shades: Sequence[QColor], *, edges: bool = False
 ) -> None:
     """Fill polygons (f, k, 2), each in the shade at its fraction (f,) of them all; with `edges` their sides too."""
@@ -196,7 +196,7 @@ def paint_arrow(painter: QPainter, x: float, tail: float, tip: float, wing: QPoi
         painter.drawLine(QPointF(x, tip), QPointF(x + side, tip + back))
 
 
-def paint_failed_solve(painter: QPainter, centre: QPointF, tokens: Tokens) -> None:
+def mark_failed_solve(painter: QPainter, centre: QPointF, tokens: Tokens) -> None:
     """Mark the place of a failed solve, on any ground: a ring with a cross."""
     painter.setBrush(Qt.BrushStyle.NoBrush)
     for colour, width in ((tokens.surface, 5.0), (tokens.wrong, 2.5)):

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from daq_app.window.new_session import Bench, SessionForm, enrolment, place_of, refusals
+from daq_app.window.new_session import Bench, SessionForm, enrolment, refusals
 from daq_app.wording import tr, tr_noop
 from sessions.plan.protocols.planning import is_code
 from sessions.plan.study import is_study
@@ -103,7 +103,7 @@ def _study_note(form: SessionForm) -> str:
         return ""
     if record is not None:
         return tr("A study of protocol {protocol}.", protocol=record.protocol)
-    names = ", ".join(studies_in(place_of(form).parent))
+    names = ", ".join(studies_in(form.parent_folder.parent))
     elsewhere = tr(" Studies there: {there}.", there=names) if names else ""
     return tr("“{name}” is no study: sessions go to a plain folder, by this page's protocol.", name=name) + elsewhere
 
@@ -113,6 +113,6 @@ def _subject_note(form: SessionForm) -> str:
     if record is not None:
         return record.sentence
     subject = form.subject.strip()
-    if not (visits := codes_in(place_of(form)).count(subject)):
+    if not (visits := codes_in(form.parent_folder).count(subject)):
         return ""
     return tr("Sessions of {subject} here already: {before}. Is it the same person?", subject=subject, before=visits)

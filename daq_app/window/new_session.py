@@ -53,6 +53,20 @@ class SessionForm:
     tablet: str = ""  # why the subject's page is on no tablet, where it should be
     pilot: bool = False  # kept apart from what people do, in no study
 
+    @property
+    def root_folder(self) -> Path:
+        """Return the folder that it names; as it was typed where it begins with the home of nobody."""
+        folder = Path(self.folder.strip() or ".")
+        try:
+            return folder.expanduser()
+        except RuntimeError:
+            return folder
+
+    @property
+    def parent_folder(self) -> Path:
+        """Return the folder in which the session gets its own."""
+        return self.root_folder / self.study.strip()
+
 
 class Refusal(dict[str, str]):
     """Why no session can begin: a sentence for each field that is wrong, by its name."""
@@ -132,7 +146,7 @@ def check_form(
         session_plan = replace(session_plan, frame=session_plan.frame.with_values(normal, height, "measured"))
     # In a study the folder's name states the purpose of the visit: the protocol is the same in all.
     purpose = session_plan.protocol if study_place is None else "forces" if session_plan.forces else "scores"
-    parent = folder_of(form) / PILOTS if form.pilot else place_of(form)
+    parent = form.root_folder / PILOTS if form.pilot else form.parent_folder
     folder = parent / f"{form.subject.strip()}_{purpose}_{now.strftime('%Y%m%dT%H%M%S')}"
     hand: Kind = "simulated hand" if form.forces and bench.simulated else "people"
     people = People("simulated people" if form.simulated else hand, seed, session_protocol.simulated_friction)
@@ -215,24 +229,10 @@ def enrolment(form: SessionForm) -> Enrolment | None:
 def enrol_subject(form: SessionForm) -> str:
     """Enrol the form's subject in its study, without measures of its finger; return why it failed, or ""."""
     try:
-        enrol(place_of(form), form.subject.strip(), Body())
+        enrol(form.parent_folder, form.subject.strip(), Body())
     except (StudyError, SettingsError, OSError) as error:
         return _sentence(error)
     return ""
-
-
-def place_of(form: SessionForm) -> Path:
-    """Return the folder in which the session gets its own."""
-    return folder_of(form) / form.study.strip()
-
-
-def folder_of(form: SessionForm) -> Path:
-    """Return the folder that a form names; as it was typed where it begins with the home of nobody."""
-    folder = Path(form.folder.strip() or ".")
-    try:
-        return folder.expanduser()
-    except RuntimeError:
-        return folder
 
 
 def _choose_protocol(form: SessionForm, new_seed: int) -> tuple[Protocol, int, Body | None, StudyPlace | None]:
@@ -242,13 +242,13 @@ def _choose_protocol(form: SessionForm, new_seed: int) -> tuple[Protocol, int, B
         return protocol(form.protocol), int(form.seed) if form.seed.strip() else new_seed, None, None
     if form.pilot:
         return study.protocol, new_seed, None, None
-    member, key = study.member(form.subject.strip()), study_key(place_of(form))
+    member, key = study.member(form.subject.strip()), study_key(form.parent_folder)
     return study.protocol, study.session_seed(member.slot), member.body, study.place(member, key)
 
 
 def _study(form: SessionForm) -> Study | None:
     """Return the study that a form names; None where it names none that was made."""
-    folder = place_of(form)
+    folder = form.parent_folder
     return open_study(folder) if form.study.strip() and is_study(folder) else None
 
 
@@ -313,7 +313,7 @@ def _refusals(form: SessionForm, bench: Bench) -> Refusal:
         value = _number(text)
         if text.strip() and (value is None or not least <= value <= most):
             wrong[name] = tr(_NUMBERS[name], highest=most, least=least, most=most) + _doubt(text)
-    if unusable := _why_unusable(folder_of(form)):
+    if unusable := _why_unusable(form.root_folder):
         wrong["folder"] = unusable
     if form.forces and not bench.connected:
         wrong["forces"] = tr("No transducer is connected: connect one, or choose scores only.")
