@@ -60,7 +60,7 @@ def _alone(kinematics: str, repeats: int) -> None:
 
 def _with_readings(seconds: float) -> None:
     from daq_app.recorder.messages import Live
-    from daq_app.window.live_model import LiveModel
+    from daq_app.window.live_model_process import LiveModel
     from sessions.plan.plan import Frame
 
     model = LiveModel()

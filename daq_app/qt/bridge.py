@@ -14,7 +14,8 @@ from daq_app.recorder.device_history import life_of
 from daq_app.recorder.messages import REQUESTS, Report, Request
 from daq_app.window.course_state import Judged
 from daq_app.window.live_feed import LiveFeed, merge_live
-from daq_app.window.live_model import LiveModel, Settle
+from daq_app.window.live_model import Settle
+from daq_app.window.live_model_process import LiveModel
 from daq_app.window.state import AppState, DevicesFound, DrawingFailed, LifeKnown, Message, Searching, Tick, fold
 from daq_app.window.stroke_quality import Judge
 from daq_app.window.subject import translator

@@ -14,7 +14,8 @@ from daq_app.qt.preferences import settings
 from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, SMALL, TEXT, TITLE, N, T, font, px
 from daq_app.window.course_state import PICTURE, Mark, picture_end
 from daq_app.window.live_feed import LiveFeed
-from daq_app.window.live_model import MODEL_CHANNELS, LiveModel, ModelTrace, model_text
+from daq_app.window.live_model import MODEL_CHANNELS, ModelTrace, model_text
+from daq_app.window.live_model_process import LiveModel
 from daq_app.window.live_trace import CHANNELS, PlotScale
 from daq_app.wording import quantity, tr, tr_noop
 from drivers.arrays import Array

@@ -16,7 +16,7 @@ from daq_app.batch.pool import by_processes, compute_visit
 from daq_app.child_process import interpreter
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Connect, Device, Failed, Gone
-from daq_app.window.live_model import LiveModel
+from daq_app.window.live_model_process import LiveModel
 from daq_app.window.stroke_quality import Judge
 from sessions.statistics.visit import VisitOptions
 from solver.verification import processes

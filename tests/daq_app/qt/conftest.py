@@ -20,7 +20,7 @@ from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import LIGHT, style_sheet
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Stop
-from daq_app.window.live_model import LiveModel
+from daq_app.window.live_model_process import LiveModel
 from daq_app.window.state import Dismissed, NewSession
 from sessions.recording import Recording
 from sessions.run import steps

@@ -11,7 +11,7 @@ from daq_app.qt.start import open_window
 from daq_app.qt.subject_side import TabletScreen
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Stop
-from daq_app.window.live_model import LiveModel
+from daq_app.window.live_model_process import LiveModel
 from daq_app.window.new_session import bench_of
 from daq_app.window.state import NewSession
 from sessions.recording import Recording

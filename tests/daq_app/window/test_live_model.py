@@ -12,7 +12,6 @@ from daq_app.recorder.messages import Live
 from daq_app.window.live_follower import Follower, settled_scene
 from daq_app.window.live_model import (
     Forces,
-    LiveModel,
     ModelTrace,
     Provisional,
     Ready,
@@ -23,6 +22,7 @@ from daq_app.window.live_model import (
     join_forces,
     model_text,
 )
+from daq_app.window.live_model_process import LiveModel
 from sessions.plan.plan import Frame
 from sessions.strokes import FrictionParameters
 from solver import NoSteadyState, solve
@@ -269,7 +269,7 @@ class SlowChild:
 
 
 def test_a_slow_full_solve_is_never_shown_beside_another_stroke(follower, monkeypatch):
-    monkeypatch.setattr("daq_app.window.live_model.Child", SlowChild)
+    monkeypatch.setattr("daq_app.window.live_model_process.Child", SlowChild)
     model = LiveModel()
     model.prepare()
     child = model._child

@@ -1,0 +1,176 @@
+"""The live model's own process, and its client in the window: one batch is under way at a time, nothing ever waits."""
+
+import signal
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from daq_app.child_process import Child, give_way
+from daq_app.recorder.messages import Live
+from daq_app.window.live_model import (
+    Forces,
+    Kinematics,
+    Provisional,
+    Ready,
+    Settle,
+    SettledSolve,
+    Use,
+    forces_of,
+    join_forces,
+)
+from daq_app.wording import tr
+from sessions.plan.plan import Frame, SessionPlan
+
+Connection = Any  # one end of a pipe; its type is another one on each system
+_OLDEST = 2.0  # forces older than this are dropped, where the model does not keep up [s]
+
+
+def run(connection: Connection) -> None:
+    """Serve the window until it is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the window decides when this ends
+    give_way()
+    # Loaded in the process alone: the window has no need of the solver, and opens sooner without it.
+    from daq_app.window.live_follower import Follower
+    from solver import SceneError
+    from solver.mesh import MeshError
+
+    follower: Follower | None = None
+    lock = threading.Lock()
+
+    def send(message: Ready | Provisional | SettledSolve) -> None:
+        with lock, suppress(OSError):  # a window that is gone is noticed below
+            connection.send(message)
+
+    def solve(solver: Callable[[], SettledSolve]) -> None:
+        send(solver())
+
+    with suppress(EOFError, OSError):
+        while True:
+            match connection.recv():
+                case Use() as use:
+                    try:
+                        if follower is None or not follower.follows(use):  # meshing takes its time
+                            follower = Follower(use)
+                        problem = ""
+                    except (SceneError, MeshError) as error:
+                        follower, problem = None, str(error)
+                    send(Ready(problem))
+                case Forces() as forces if follower is not None:
+                    send(follower.take(forces))
+                case Settle() as request:
+                    if follower is not None:  # beside the next stroke, which is followed meanwhile
+                        threading.Thread(target=solve, args=(follower.settled_solver(request),), daemon=True).start()
+                case _:
+                    send(Ready(tr("no finger to follow")))
+
+
+class LiveModel:
+    """The live model as the window sees it. `add` and `poll` never wait for it."""
+
+    def __init__(self) -> None:
+        self.provisional: Provisional | None = None  # the newest
+        self.settled: SettledSolve | None = None  # of the last stroke; None again once another begins
+        self.problem = ""  # why there are no predictions; empty where all is well
+        self.predictions = 0  # that came so far
+        self._child: Child | None = None
+        self._under_way = 0
+        self._unsent: list[Forces] = []
+        self._requests: list[Use | Forces | Settle] = []
+        self._steady: tuple[float, float] | None = None  # steady window of the last stroke, until another touch
+        self._plan: SessionPlan | None = None
+        self.kinematics: Kinematics = "small"  # that is asked for
+
+    def prepare(self) -> None:
+        """Start the process; it follows the published finger until a plan states another."""
+        if self._child is None:
+            self._child = Child(run, name="live model")
+            self._under_way, self.problem = 0, ""
+            self._use()
+
+    def close(self) -> None:
+        """Let it end."""
+        if self._child is not None:
+            self._child.close()
+        self._child = None
+
+    def follow(self, plan: SessionPlan | None) -> None:
+        """Follow the finger of another plan."""
+        self._plan, self.settled, self._steady = plan, None, None
+        if self._child is None and self.problem:
+            self.prepare()  # one that has ended gets another chance with the next session
+        else:
+            self._use()
+
+    def follow_at(self, kinematics: Kinematics) -> None:
+        """Follow the same finger in this kinematics."""
+        if kinematics != self.kinematics:
+            self.kinematics = kinematics
+            self._use()
+
+    def add(self, live: Live, frame: Frame) -> None:
+        """Take readings."""
+        forces = None if self._child is None else forces_of(live, frame)
+        if forces is None:
+            return
+        if self._unsent and self._unsent[-1].stream != forces.stream:
+            self._unsent.clear()
+        self._unsent.append(forces)
+        while len(self._unsent) > 1 and forces.time[-1] - self._unsent[0].time[0] > _OLDEST:
+            self._unsent.pop(0)
+
+    def settle(self, request: Settle) -> None:
+        """Ask for the full solve of a stroke, once all that was added until now was followed."""
+        if self._child is not None:
+            self._requests += [join_forces(self._unsent), request] if self._unsent else [request]
+            self._unsent = []
+
+    def poll(self) -> tuple[Provisional, ...]:
+        """Take what came, and send what waits; return the predictions that are new."""
+        if self._child is None:
+            return ()
+        news: list[Provisional] = []
+        try:
+            while (message := self._child.receive()) is not None:
+                self._under_way -= not isinstance(message, SettledSolve)  # it comes when it comes
+                self._take(message)
+                news += [message] if isinstance(message, Provisional) else []
+            if not self._under_way:
+                self._send(self._child)
+        except (EOFError, OSError):
+            self.close()
+            self.problem = tr("the live model has stopped; it starts again with the next session")
+        return tuple(news)
+
+    def _take(self, message: Ready | Provisional | SettledSolve) -> None:
+        match message:
+            case Ready(problem):
+                self.problem = problem
+            case Provisional():
+                self.provisional = message
+                self.predictions += 1
+                if message.sed.any():  # its forces came after the stroke: something touches again
+                    self.settled = self._steady = None
+            case SettledSolve():
+                if message.steady == self._steady:  # a slow one may be of a stroke before
+                    self.settled = message
+
+    def _send(self, child: Child) -> None:
+        if self._requests:
+            request = self._requests.pop(0)
+            if isinstance(request, Forces) and self.problem:
+                return
+            child.send(request)
+            if isinstance(request, Settle):
+                self.settled, self._steady = None, request.steady
+                return
+        elif self._unsent and not self.problem:
+            child.send(join_forces(self._unsent))
+            self._unsent = []
+        else:
+            return
+        self._under_way = 1
+
+    def _use(self) -> None:
+        self.provisional = None  # of another finger
+        self._requests = [Use(self._plan, self.kinematics)]
