@@ -97,10 +97,10 @@ def _with_forces(recording: Recording, stroke: StrokeFinding, block: ReadingBloc
 
 
 class History(Struct, frozen=True):
-    """The decisions that can be undone, the last one at the end, and those that can be redone, the next one first."""
+    """What undo and redo would do next, in words; empty where there is nothing."""
 
-    undoable: tuple[str, ...] = ()  # each in words
-    redoable: tuple[str, ...] = ()
+    undo: str = ""
+    redo: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,23 +149,16 @@ def decision_of(stroke: StrokeFinding, edge: Edge, time: float, author: str, rea
 
 def reversal(decisions: Decisions, author: str, *, redo: bool) -> Decision | None:
     """Return the line that undoes the last decision in force, or `redo` takes the last undoing back; None: nothing."""
-    lines = _undone(decisions) if redo else _standing(decisions)
+    lines = _undone(decisions) if redo else [line for line in decisions.standing if line.undoes is None]
     reason = "redone in the window" if redo else "undone in the window"
     return Decision(author, reason, undoes=lines[-1].number) if lines else None
 
 
 def history(decisions: Decisions) -> History:
-    """Return which decisions can be undone, and which redone."""
-    undone = [effective_decision(decisions, line) for line in reversed(_undone(decisions))]
-    undoable, redoable = (
-        tuple(f"{decision.what} of {decision.target_text}" for decision in lines)
-        for lines in (_standing(decisions), undone)
-    )
-    return History(undoable, redoable)
-
-
-def _standing(decisions: Decisions) -> list[Decision]:
-    return [line for line in decisions.standing if line.undoes is None]
+    """Return what undo and redo would do next."""
+    lines = (reversal(decisions, "", redo=redo) for redo in (False, True))
+    effects = (None if line is None else effective_decision(decisions, line) for line in lines)
+    return History(*("" if effect is None else f"{effect.what} of {effect.target_text}" for effect in effects))
 
 
 def _undone(decisions: Decisions) -> list[Decision]:

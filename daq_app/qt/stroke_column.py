@@ -169,11 +169,11 @@ class DecisionsBar(QWidget):
         return self.reason_field.text().strip() or DRAGGED
 
     def show_history(self, history: History) -> None:
-        for widget, decisions, text in (
-            (self.undo, history.undoable[-1:], tr_noop("undo {decision}, Ctrl+Z")),
-            (self.redo, history.redoable[:1], tr_noop("redo {decision}, Ctrl+Shift+Z")),
+        for widget, decision, text in (
+            (self.undo, history.undo, tr_noop("undo {decision}, Ctrl+Z")),
+            (self.redo, history.redo, tr_noop("redo {decision}, Ctrl+Shift+Z")),
         ):
-            widget.setEnabled(bool(decisions))
+            widget.setEnabled(bool(decision))
             none = tr("{button}: no decision", button=widget.text())
-            widget.setAccessibleName(tr(text, decision=decisions[0]) if decisions else none)
+            widget.setAccessibleName(tr(text, decision=decision) if decision else none)
             widget.setToolTip(widget.accessibleName())

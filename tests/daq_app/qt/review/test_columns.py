@@ -248,13 +248,12 @@ def test_ctrl_z_undoes_and_ctrl_shift_z_redoes_and_the_buttons_say_what(window):
     assert not bar.undo.isEnabled()
     QTest.keyClick(window, Qt.Key.Key_Z, control)
     assert not any(isinstance(request, m.Undo) for request in window._work.requests)
-    history = m.History(("onset of trial 1", "lift of trial 2"), ("steady of trial 3",))
-    window.take(m.ReportReady("predicted", example(), history))
+    window.take(m.ReportReady("predicted", example(), m.History("lift of trial 2", "steady of trial 3")))
     assert not any(isinstance(request, m.Undo) for request in window._work.requests)
     assert bar.undo.accessibleName() == "undo lift of trial 2, Ctrl+Z"
     assert bar.redo.accessibleName() == "redo steady of trial 3, Ctrl+Shift+Z"
     QTest.keyClick(window, Qt.Key.Key_Z, control)
-    window.take(m.ReportReady("predicted", example(), m.History(("onset of trial 1",), ("lift of trial 2",))))
+    window.take(m.ReportReady("predicted", example(), m.History("onset of trial 1", "lift of trial 2")))
     assert bar.redo.accessibleName() == "redo lift of trial 2, Ctrl+Shift+Z"
     QTest.keyClick(window, Qt.Key.Key_Z, control | Qt.KeyboardModifier.ShiftModifier)
     assert [request.redo for request in window._work.requests if isinstance(request, m.Undo)] == [False, True]
