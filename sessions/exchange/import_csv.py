@@ -207,7 +207,11 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
             f"{path}: its readings span {time[-1]:.3g} s, more than a session can ({_LONGEST:g} s); name the time's "
             f"unit in the header ({', '.join(TIME_UNITS)}), or give a higher --rate"
         )
-    block = _block(time, rows[:, list(layout.axes)])
+    position, received = (
+        np.arange(len(time), dtype=np.int64),
+        np.rint(time * 1e9).astype(np.int64),
+    )  # the file tells no other instant
+    block = ReadingBlock(position, position, np.zeros(len(time), np.int64), time, received, rows[:, list(layout.axes)])
     clock = StillClock(int(block.received_ns[-1]))
     source = {
         "file": path.name,
@@ -313,12 +317,6 @@ def _says_simulated(content: bytes, names: Sequence[str]) -> bool:
     """Say whether a comment at the file's head, or a column, says that it came from a simulator."""
     comments = [line for line in content[:4096].decode(errors="replace").splitlines() if line.startswith(COMMENT)]
     return any(_SIMULATED in text for text in (*comments, *names))
-
-
-def _block(time: Array, raw: Array) -> ReadingBlock:
-    position = np.arange(len(time), dtype=np.int64)
-    received = np.rint(time * 1e9).astype(np.int64)  # the file tells no other instant
-    return ReadingBlock(position, position, np.zeros(len(time), np.int64), time, received, raw)
 
 
 def _info(

@@ -150,7 +150,13 @@ def write_copy(
         file.attrs["format"] = _attribute(FORMAT)
         file.attrs["format_version"] = FORMAT_VERSION  # of the copy: the live file may be of an earlier one
         file.attrs["description"] = _attribute("every table, data set, unit and byte: docs/session-format.md")
-        readings = _empty_readings(file)
+        readings: dict[str, h5py.Dataset] = {}
+        for name, dtype in COLUMNS.items():
+            width = (6,) if name == "raw" else ()
+            readings[name] = file.create_dataset(
+                f"readings/{name}", (0, *width), dtype, maxshape=(None, *width), chunks=(CHUNK, *width), fletcher32=True
+            )
+            _describe(readings[name], *READING_NOTES[name])
         for block in recording.blocks():
             for name, column in readings.items():
                 values = getattr(block, name)
@@ -184,7 +190,8 @@ def differences(recording: Recording) -> Iterator[str]:
             for entry in data_sets(recording):
                 if older and entry.name not in file:
                     continue  # a later version holds more
-                if not _equal_bytes(np.asarray(file[entry.name]), entry.values):
+                values, stored = entry.values, np.asarray(file[entry.name])
+                if stored.shape != values.shape or stored.astype(values.dtype).tobytes() != values.tobytes():
                     yield f"{entry.name} of {SEALED_FILE} differs from the live file"
             pairs = zip_longest(read_texts(file, EVENT_DATA), _event_texts(recording))
             if any(stored is None or text is None or stored != text.encode() for stored, text in pairs):
@@ -264,17 +271,6 @@ def _trials(recording: Recording) -> Iterator[DataSet]:
     yield DataSet("trials/stop_ns", _int64([r.stop_ns or 0 for r in records]), "ns", "of that take, session clock")
 
 
-def _empty_readings(file: h5py.File) -> dict[str, h5py.Dataset]:
-    data_sets: dict[str, h5py.Dataset] = {}
-    for name, dtype in COLUMNS.items():
-        width = (6,) if name == "raw" else ()
-        data_sets[name] = file.create_dataset(
-            f"readings/{name}", (0, *width), dtype, maxshape=(None, *width), chunks=(CHUNK, *width), fletcher32=True
-        )
-        data_sets[name].attrs["unit"], data_sets[name].attrs["note"] = map(_attribute, READING_NOTES[name])
-    return data_sets
-
-
 def _different_readings(recording: Recording, file: h5py.File) -> Iterator[str]:
     start = 0
     for block in recording.blocks():
@@ -292,10 +288,6 @@ def _different_readings(recording: Recording, file: h5py.File) -> Iterator[str]:
 
 def _describe(data_set: h5py.Dataset, unit: str, note: str) -> None:
     data_set.attrs["unit"], data_set.attrs["note"] = _attribute(unit), _attribute(note)
-
-
-def _equal_bytes(stored: NDArray[Any], expected: NDArray[Any]) -> bool:
-    return stored.shape == expected.shape and stored.astype(expected.dtype).tobytes() == expected.tobytes()
 
 
 def _int64(values: Sequence[int]) -> Indices:

@@ -9,7 +9,6 @@ from operator import attrgetter
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from sessions.prediction.stored import Ends
 from sessions.report.contents import Experiment, Numbers, PredictionFinding
@@ -51,7 +50,12 @@ def score_panel(findings: Experiment | DescriptorFindings) -> Panel | None:
         subject_scores = [math.nan if score is None else score for score in scores]
         axes.plot(positions, subject_scores, "o", ms=2, color=GREY, alpha=0.55, mew=0)
     for mean in findings.scores:
-        _draw_mean(picture, axes, mean)
+        text = f"index {mean.index}: mean {mean.mean:.1f}, {plural(mean.n, 'subject')}"
+        if mean.low is not None and mean.high is not None:
+            text += f", 95 % interval {mean.low:.1f} to {mean.high:.1f}"
+            errors = [[mean.mean - mean.low], [mean.high - mean.mean]]
+            axes.errorbar(mean.index, mean.mean, yerr=errors, color=INK, linewidth=1.1, capsize=3, capthick=0.8)
+        axes.plot(mean.index, mean.mean, "o", markersize=5, color=INK, gid=picture.note(text))
     low = min([-4.0, *(m.low - 2 for m in findings.scores if m.low is not None)])
     axes.set(xlim=(-9, 106), ylim=(low, 109), xticks=findings.indices, yticks=_TICKS, title=name)
     axes.set(xlabel=f"index of {findings.descriptor} [–]", ylabel=f"score of {findings.descriptor} [0–100]")
@@ -61,15 +65,6 @@ def score_panel(findings: Experiment | DescriptorFindings) -> Panel | None:
     by_index = dict(zip(findings.indices, zip(*findings.answers.values(), strict=True), strict=False))
     rows = tuple((m.index, m.n, m.mean, m.sd, m.low, m.high, *by_index.get(m.index, ())) for m in findings.scores)
     return picture.panel(f"scores-{name}", title, header, rows)
-
-
-def _draw_mean(picture: Sheet, axes: Axes, mean: MeanScore) -> None:
-    text = f"index {mean.index}: mean {mean.mean:.1f}, {plural(mean.n, 'subject')}"
-    if mean.low is not None and mean.high is not None:
-        text += f", 95 % interval {mean.low:.1f} to {mean.high:.1f}"
-        errors = [[mean.mean - mean.low], [mean.high - mean.mean]]
-        axes.errorbar(mean.index, mean.mean, yerr=errors, color=INK, linewidth=1.1, capsize=3, capthick=0.8)
-    axes.plot(mean.index, mean.mean, "o", markersize=5, color=INK, gid=picture.note(text))
 
 
 def study_plates(study: StudyFindings) -> tuple[Plate, ...]:

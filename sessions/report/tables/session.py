@@ -197,12 +197,6 @@ def answer_tables(report: Report) -> tuple[Table | None, ...]:
     return tuple(tables)
 
 
-def other_answer_table(report: Report) -> Table | None:
-    """Return the numbers and the choices of the session's own subject."""
-    groups = [(e.name, list(e.other_answers)) for e in report.experiments]
-    return table("table-other-answers", "session-other-answers", "trial | index | answer", groups)
-
-
 def relation_table(report: Report) -> Table | None:
     """Return how the predicted quantity goes with mean scores and with the indices."""
     quantity = shown_response(report.response)
@@ -250,10 +244,7 @@ def _relation_row(name: str, relation: Relation) -> Row:
     )
 
 
-NamedPaths = tuple[str, Sequence[PathFinding]]
-
-
-def paths_table(path_groups: Iterable[NamedPaths]) -> Table | None:
+def paths_table(path_groups: Iterable[tuple[str, Sequence[PathFinding]]]) -> Table | None:
     """Return five-number summaries of the correlation over all paths and over those with each choice, by descriptor."""
     groups = [(name, _rows(findings)) for name, findings in path_groups if findings]
     columns = (
@@ -302,6 +293,7 @@ def _spread(summary: FiveNumberSummary | None, paths: int) -> Row:
 def tables(report: Report) -> dict[str, tuple[Table, ...]]:
     """Return the tables a report has numbers for, by section, in their order."""
     rival_groups = [(e.name, e.rivals) for e in report.experiments]
+    other_answers = [(e.name, e.other_answers) for e in report.experiments]
     sections = {
         "relation": (relation_table(report),),
         "strokes": (stroke_table(report), course_table(report)),
@@ -316,7 +308,7 @@ def tables(report: Report) -> dict[str, tuple[Table, ...]]:
         "scores": (
             score_table(report),
             *answer_tables(report),
-            other_answer_table(report),
+            table("table-other-answers", "session-other-answers", "trial | index | answer", other_answers),
             psychometric_table(session_functions(report)),
         ),
         "afferent": (of_predictions.afferent_table(report),),
