@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -94,8 +94,7 @@ def _readme(recording: Recording, contents: Sequence[tuple[str, str, Sequence[Co
         "Clocks: `_ns` is nanoseconds on the session clock of the recording computer; seconds of strokes and readings",
         "are those of the transducer's own clock, 0 at its first reading.",
     ]
-    describe: Callable[[Column], str] = lambda c: f"| `{c.heading}` | {c.unit or '–'} | {c.meaning} |"  # noqa: E731
     for name, meaning, table_columns in contents:
         lines += ["", f"## {name}", "", f"{meaning[0].upper()}{meaning[1:]}.", "", "| column | unit | meaning |"]
-        lines += ["| --- | --- | --- |", *map(describe, table_columns)]
+        lines += ["| --- | --- | --- |", *(f"| `{c.heading}` | {c.unit or '–'} | {c.meaning} |" for c in table_columns)]
     return "\n".join([*lines, ""])

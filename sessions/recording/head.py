@@ -226,12 +226,9 @@ def info_to_dict(info: TransducerInfo) -> dict[str, Any]:
         "summary": info.status.summary,
         "status_bits": [asdict(entry) for entry in info.status.bits],
         "calibration": {
-            "serial": calibration.serial,
-            "raw_unit": calibration.raw_unit,
+            **asdict(calibration),
             "matrix": calibration.matrix.tolist(),
             "rated": [_none_for_nan(value) for value in calibration.rated.tolist()],
-            "source": calibration.source,
-            "tool": list(calibration.tool),
             "sha256": calibration_hash(calibration),
         },
     }

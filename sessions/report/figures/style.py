@@ -150,16 +150,9 @@ def shades(colour: str, n: int) -> tuple[str, ...]:
     >>> shades("#808080", 1)
     ('#808080',)
     """
-    if n == 1:
-        return (colour.lower(),)
-    return tuple(_shade(colour, 0.3 - 1.0 * i / (n - 1)) for i in range(n))
-
-
-def _shade(colour: str, towards: float) -> str:
-    """Return the colour moved by `towards` (-1 to 1) of the way to black (below 0) or white (above)."""
-    goal, share = (1.0, towards) if towards > 0 else (0.0, -towards)
-    red, green, blue = (c + share * (goal - c) for c in to_rgb(colour))
-    return to_hex((red, green, blue))
+    rgb = np.array(to_rgb(colour))
+    parts = [0.3 - 1.0 * i / (n - 1) for i in range(n)] if n > 1 else [0.0]  # of the way to white, below 0 to black
+    return tuple(to_hex((rgb + abs(part) * ((part > 0.0) - rgb)).tolist()) for part in parts)
 
 
 @contextmanager
