@@ -24,12 +24,10 @@ class Elasticity(Protocol):
     @property
     def shear(self) -> float:
         """Shear modulus of the undeformed tissue [MPa]."""
-        ...
 
     @property
     def lame(self) -> float:
         """Lamé's first constant of the undeformed tissue [MPa]."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +132,6 @@ class Law(Elasticity, Protocol):
     @property
     def stiffening(self) -> float:
         """Ogden's exponent, by which the shear modulus grows with strain; NEO_HOOKEAN for a constant modulus [-]."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -100,8 +100,6 @@ def _record(trial: Trial, events: Sequence[LoggedEvent]) -> TrialRecord:
                 takes[number] = replace(takes[number], discard_reason=None)
             case "skip" | "left_out":
                 outcome = "skipped"
-            case _:
-                pass
     counts = takes[valid_take] if valid_take is not None else None
     other_takes = tuple(take for take in takes.values() if take is not counts)
     answer = answers.get(in_hand)

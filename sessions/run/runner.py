@@ -30,11 +30,9 @@ class Operator(Protocol):
 
     def show(self, command: Command) -> None:
         """Take a command; those that ask for something are answered through `poll` when it is done."""
-        ...
 
     def poll(self) -> Sequence[Event]:
         """Return what has happened since the last call, in order."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

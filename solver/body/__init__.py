@@ -34,40 +34,31 @@ class CondensedBody(Protocol):
     @property
     def compliance(self) -> Array:
         """The inverse of the stiffness, bordered by `motions` (2 k + m, 2 k + m) [mm per N/mm]; (0, 0) if unknown."""
-        ...
 
     @property
     def motions(self) -> Array:
         """Rigid motions (2 k, m) along which the surface alone balances the loads."""
-        ...
 
     def undeformed(self) -> tuple[Array, Array]:
         """Return the displacements and pressures of the undeformed body."""
-        ...
 
     def place(self, u: Array) -> Array:
         """Return the positions of the skin's nodes (k, 2) at displacements `u` [mm]."""
-        ...
 
     def linearise(self, u: Array, pressure: Array) -> bool:
         """Set `stiffness` and `force` at a state; return False where the state is inside out or singular."""
-        ...
 
     def relinearise(self, u: Array) -> bool:
         """Set `force` at a state and keep the stiffness; return False where the state is inside out."""
-        ...
 
     def recover(self, u: Array, pressure: Array, step: Array, scale: float) -> tuple[Array, Array, float]:
         """Return a state after `scale` times the skin's `step` (2 k,), and the largest move of the full step [mm]."""
-        ...
 
     def stored_energy(self, u: Array, reaction: Array) -> float:
         """Return the energy stored at displacements `u`, held by surface forces `reaction` (k, 2) [N mm per mm]."""
-        ...
 
     def work(self, path: Sequence[Array], trapezoid: float) -> float:
         """Return the work of the skin's forces along a path [N mm per mm]; `trapezoid` is its trapezoidal sum."""
-        ...
 
 
 class Body(Protocol):
@@ -76,40 +67,32 @@ class Body(Protocol):
     @property
     def mesh(self) -> Mesh:
         """Its mesh."""
-        ...
 
     @property
     def condensed(self) -> CondensedBody:
         """The body condensed to its skin."""
-        ...
 
     @property
     def centre(self) -> Array:
         """Origins (e, 2) of the elements' pressure modes [mm]."""
-        ...
 
     def displacement(self, u: Array, only: Indices | None = None) -> Array:
         """Return the displacements (n, 2, ...) of all nodes for one state `u` or several.
 
         With `only` (node numbers), other nodes may be left at 0.
         """
-        ...
 
     def following(self, skin: Array) -> Array:
         """Return the increments (n, 2, c) of all nodes by back substitution of the skin's (2 k, c)."""
-        ...
 
     def forces(self, displacement: Array) -> Array:
         """Return the internal forces (n, 2) at `displacement` (n, 2) [N/mm]."""
-        ...
 
     def energy_growth(self, displacement: Array) -> float:
         """Return the derivative of the stored energy by a factor of `displacement` (n, 2), at 1 [N]."""
-        ...
 
     def smallest_det(self, displacement: Array) -> float:
         """Return the smallest det F [-] at `displacement` (n, 2); not positive where tissue is inside out."""
-        ...
 
 
 class CondensedLinear:

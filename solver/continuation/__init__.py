@@ -66,15 +66,12 @@ class BranchBody(Protocol):
     @property
     def newton(self) -> Newton:
         """Newton's method on the body."""
-        ...
 
     def skin_compression(self, state: EquilibriumState) -> SkinCompression:
         """Return how far the skin is squeezed, and whether it has a crease."""
-        ...
 
     def crosses(self, state: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -40,11 +40,9 @@ class Tissue(Protocol):
 
     def ready(self, step: float) -> Newton:
         """Prepare a time step [s] and return Newton's method on the body of that step."""
-        ...
 
     def commit(self, state: EquilibriumState, step: float) -> Array:
         """Take the step that was prepared, to `state`; return the energy stored at each ending (r,) [MPa]."""
-        ...
 
 
 class RelaxingBody:

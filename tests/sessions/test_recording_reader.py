@@ -5,12 +5,10 @@ import shutil
 import sqlite3
 import tracemalloc
 import zlib
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
-from threading import Event
 
 import pytest
 import recordings
@@ -58,24 +56,6 @@ def test_a_trials_readings_are_those_received_during_its_take(tmp_path):
     assert recording.readings().sequence.tolist() == list(range(400))
     assert recording.readings_between(101, 301).sequence.tolist() == list(range(100, 300))
     assert recording.readings_between(300, None).sequence.tolist() == list(range(200, 400))
-
-
-def test_a_session_that_ends_while_it_is_opened_is_read(tmp_path):
-    folder = record_session(tmp_path / "s", blocks=2)
-    log, over = folder / "session.sqlite-wal", Event()
-
-    def toggle():  # as the recorder begins and ends: SQLite removes the log when its last connection closes
-        while not over.is_set():
-            log.write_bytes(bytes(32))
-            log.unlink(missing_ok=True)
-
-    with ThreadPoolExecutor(1) as pool:
-        pool.submit(toggle)
-        try:
-            counts = {len(Recording.open(folder).readings()) for _ in range(100)}
-        finally:
-            over.set()
-    assert counts == {200}
 
 
 def test_a_trial_the_plan_does_not_have_is_refused(tmp_path):

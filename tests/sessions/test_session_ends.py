@@ -2,8 +2,11 @@
 
 import os
 import signal
+from concurrent.futures import ThreadPoolExecutor
+from threading import Event
 
 import pytest
+from recordings import record_session
 from simulated_session import Session, once
 
 from drivers.transducer import SetupError
@@ -114,3 +117,21 @@ def test_a_session_whose_end_cannot_be_written_lets_go_of_its_file(tmp_path):
         session.run()
     seal(tmp_path / "s")  # refused while anybody has it open
     assert Recording.open(tmp_path / "s").end is None
+
+
+def test_a_session_that_ends_while_it_is_opened_is_read(tmp_path):
+    folder = record_session(tmp_path / "s", blocks=2)
+    log, over = folder / "session.sqlite-wal", Event()
+
+    def toggle():  # as the recorder begins and ends: SQLite removes the log when its last connection closes
+        while not over.is_set():
+            log.write_bytes(bytes(32))
+            log.unlink(missing_ok=True)
+
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(toggle)
+        try:
+            counts = {len(Recording.open(folder).readings()) for _ in range(100)}
+        finally:
+            over.set()
+    assert counts == {200}
