@@ -139,20 +139,17 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
     """Return every table of a session but those of events and readings; predictions only where they were stored."""
     analysis = source.analysis
     flaws = [{"flaw": row["name"], **_without(row, "name")} for row in analysis["flaws"]]
-    of_session = (
+    of_model, decisions = "what the model is given: a row for each trial with a stroke", analysis.get("decisions")
+    return (
         trials(source.recording),
         answers(source.recording),
         positions(source.recording),
         _table("strokes", "a row for each stroke", _strokes(analysis), _STROKE),
-        _table(
-            "friction", "what the model is given: a row for each trial with a stroke", _friction(analysis), _FRICTION
-        ),
+        _table("friction", of_model, _friction(analysis), _FRICTION),
         _table("flaws", "what is wrong with the recording or with a stroke", flaws, FLAW),
+        *([_table("decisions", "what people decided, in force", decisions, DECISION)] if decisions else []),
+        *(() if source.prediction is None else _predictions(source.prediction)),
     )
-    if analysis.get("decisions"):
-        decisions = _table("decisions", "what people decided, in force", analysis["decisions"], DECISION)
-        of_session = (*of_session, decisions)
-    return of_session if source.prediction is None else (*of_session, *_predictions(source.prediction))
 
 
 def _predictions(prediction: Mapping[str, Any]) -> Iterable[Table]:

@@ -147,15 +147,10 @@ class Recording:
 
     def readings(self, trial: int | None = None) -> ReadingBlock:
         """Return all readings, or those of the take of `trial` that counts (none where no take does)."""
-        if trial is None:
-            return self._all_readings()
-        record = self.trial(trial)
-        if record.start_ns is None:
-            return ReadingBlock.empty()
-        return self.readings_between(record.start_ns, record.stop_ns)
-
-    def _all_readings(self) -> ReadingBlock:
-        """Return the readings of all blocks, each put where it stays as it comes: joining would hold an hour twice."""
+        if trial is not None:
+            start_ns, stop_ns = self.trial(trial).start_ns, self.trial(trial).stop_ns
+            return ReadingBlock.empty() if start_ns is None else self.readings_between(start_ns, stop_ns)
+        # Each block is put where it stays as it comes: joining would hold an hour twice.
         path = self.folder / schema.LIVE_FILE
         bytes_held = _size(path) + _size(_side_file(path, "-wal"))
         capacity = min(bytes_held // schema.BYTES_A_READING, self._row_capacity())

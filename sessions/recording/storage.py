@@ -168,7 +168,11 @@ def mac_mounts(table: str) -> tuple[Mount, ...]:
 
 def _on_a_network(folder: Path) -> str | None:
     if sys.platform == "win32":
-        return f"{folder} lies on a network drive; {MOVE}" if _windows_network(folder) else None
+        import ctypes
+
+        names_computer = folder.drive.startswith("\\\\")
+        remote = names_computer or ctypes.windll.kernel32.GetDriveTypeW(f"{folder.drive}\\") == 4  # DRIVE_REMOTE
+        return f"{folder} lies on a network drive; {MOVE}" if remote else None
     mount = network_mount(folder, _mounts())
     return None if mount is None else f"{folder} lies on another computer or is shared with one ({mount.kind}); {MOVE}"
 
@@ -182,16 +186,6 @@ def _mounts() -> Sequence[Mount]:
     except (OSError, subprocess.TimeoutExpired):
         return ()
     return mac_mounts(output)
-
-
-def _windows_network(folder: Path) -> bool:
-    """Say whether Windows calls the drive a remote one (GetDriveTypeW: 4), or the path names a computer."""
-    if folder.drive.startswith("\\\\"):
-        return True
-    import ctypes
-
-    windows = getattr(ctypes, "windll", None)
-    return windows is not None and windows.kernel32.GetDriveTypeW(f"{folder.drive}\\") == 4
 
 
 def _program_by_mark(location: Path) -> str | None:

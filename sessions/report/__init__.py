@@ -185,7 +185,5 @@ def _surface_series(trials: Sequence[TrialRow]) -> dict[str, dict[int, float]]:
 
 def _relation(x: Mapping[int, float], responses: Mapping[int, float]) -> Relation | None:
     """Return how responses go with x, over the indices that have both; None where there is none."""
-    indices = [index for index in sorted(x) if index in responses]
-    if not indices:
-        return None
-    return relation([x[index] for index in indices], [responses[index] for index in indices], indices)
+    indices = sorted(x.keys() & responses.keys())
+    return relation([x[i] for i in indices], [responses[i] for i in indices], indices) if indices else None

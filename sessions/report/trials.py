@@ -254,10 +254,8 @@ def _row(row: TrialPrediction) -> dict[float, float]:
 
 def field_of(experiment: str, row: TrialPrediction) -> Field | None:
     """Return the settled finger of a trial; None where there is no prediction."""
-    picture = row.picture()
-    if picture is None or row.stimulus is None:
-        return None
-    return Field(experiment, row.stimulus.known_index, *picture)
+    picture, stimulus = row.picture(), row.stimulus
+    return None if picture is None or stimulus is None else Field(experiment, stimulus.known_index, *picture)
 
 
 NO_ESTIMATE = "no estimate"  # of what leaving an effect out changes
