@@ -17,13 +17,13 @@ from sessions.recording.head import without_home
 
 @pytest.fixture(scope="module")
 def session_folder(tmp_path_factory):
-    """A session whose computer, user and folders have names that would be known again."""
-    home = tmp_path_factory.mktemp("anna-schmidts-home")
+    """A session whose computer, user and folders have names so long that packed readings do not hold them by chance."""
+    home = tmp_path_factory.mktemp("annegret-schmidts-home")
     with pytest.MonkeyPatch.context() as patch:
         for name in ("HOME", "USERPROFILE", "APPDATA"):
             patch.setenv(name, str(home))
         for name in ("USER", "LOGNAME", "USERNAME"):
-            patch.setenv(name, "anna-schmidt")
+            patch.setenv(name, "annegret-schmidt")
         folder = home / "recordings" / "P07"
         with Recorder.start(PACE) as recorder:
             desk = Desk(recorder)
@@ -34,7 +34,7 @@ def session_folder(tmp_path_factory):
 
 
 def test_no_file_of_a_session_names_computer_user_or_folder(session_folder):
-    words = {"anna", "schmidt", str(session_folder), str(Path.home())}
+    words = {"annegret", "schmidt", str(session_folder), str(Path.home())}
     words |= {word for word in (platform.node(), getpass.getuser()) if len(word) > 4}
     for path in session_folder.rglob("*"):
         content = path.read_bytes().lower() + path.name.lower().encode()
