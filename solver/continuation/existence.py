@@ -25,10 +25,10 @@ BEYOND_LIMIT = 0.06  # relative distance beyond a limit at which another path is
 def steady(
     finger: FiniteFinger, load: LoadState, tolerance: float = 1e-10, start: EquilibriumState | None = None
 ) -> EquilibriumState:
-    """Return the settled slide under `load` that lies on the branch from the frictionless state.
+    """Return the settled slide under `load` that lies on the branch from the frictionless state or a shallow press.
 
     The search begins at `start`. A state whose skin might have folded, or that is not found directly, is proven by
-    following the branch on meshes made for it. Raises NoSteadyState with both limits where the branch ends before,
+    following the branch on meshes made for it. Raises NoSteadyState with its limits where the branch ends before,
     NotConverged where it has no first state, Cancelled.
     """
     candidates: list[EquilibriumState] = []
@@ -77,7 +77,7 @@ def steep(load: LoadState) -> bool:
 
 
 def refuse_far_beyond(scene: Scene, load: LoadState) -> None:
-    """Raise NoSteadyState where the branch ends far below the friction of `load`.
+    """Raise NoSteadyState where the branch ends far below the friction or depth of `load`.
 
     For a coarse mesh without a state, or with folded skin: a failing fine mesh costs more than following the branch.
     Nothing is raised where the branch ends so near that another mesh may have the state.

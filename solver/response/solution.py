@@ -351,18 +351,18 @@ def _errors(
 ) -> list[float]:
     """Return the errors of all answers by their tolerances, 0 for coarser answers in place of `failures`."""
     return [
-        0.0 if i in failures else _error_by_tolerance(answers[i], limits_known=meshes[i] != FIRST_FINENESS)
+        0.0 if i in failures else _error_by_tolerance(answers[i], on_first=meshes[i] == FIRST_FINENESS)
         for i in sorted(answers)
     ]
 
 
-def _error_by_tolerance(answer: Answer, *, limits_known: bool) -> float:
+def _error_by_tolerance(answer: Answer, *, on_first: bool) -> float:
     """Return an answer's error estimate by the tolerance of its scene, `ASSUMED_ERROR` where it is not known.
 
-    A failure counts as unknown unless `limits_known`: unless its mesh gives limits to 3 %. Where the free cut folds,
+    A failure `on_first`, the first mesh, counts as unknown: a finer one may have a state. Where the free cut folds,
     the error is unknown on finer meshes too, and counts as 0.
     """
-    if isinstance(answer, SolveFailure) and not limits_known:
+    if isinstance(answer, SolveFailure) and on_first:
         return ASSUMED_ERROR
     if not isinstance(answer, Prediction) or isinstance(answer.unknown, CutFolds):
         return 0.0

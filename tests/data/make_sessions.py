@@ -1,30 +1,27 @@
-"""Makes the sessions of this format version that later versions must still read: `python tests/data/make_sessions.py`.
+"""Makes the sessions of this format version that later versions must still read.
 
-Two trials in simulated time, pressing 2 N, dragging 1 N, sliding at 20 mm/s. `sealed` ended as it should;
-`live` was left by a crash in its second trial, write-ahead log and all. Made once, when a version is released.
+Made once, when a version is released: `PYTHONPATH=tests/sessions python tests/data/make_sessions.py`. Two trials in
+simulated time, pressing 2 N, dragging 1 N, sliding at 20 mm/s. `sealed` ended as it should; `live` was left by a crash
+in its second trial, write-ahead log and all.
 """
 
 import shutil
-import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from stand_ins import Hands, ResumableClock, StandIn
+
+from sessions.plan.protocols.planning import plan
+from sessions.plan.protocols.protocol import protocol
+from sessions.recording import SessionWriter, provenance
+from sessions.recording.archive import seal
+from sessions.recording.schema import FORMAT_VERSION
+from sessions.run.runner import run_session
+from sessions.run.steps import AskStroke
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "sessions")]
-
-from stand_ins import Hands, ResumableClock, StandIn  # noqa: E402
-
-from sessions.plan.protocols.planning import plan  # noqa: E402
-from sessions.plan.protocols.protocol import protocol  # noqa: E402
-from sessions.recording import SessionWriter, provenance  # noqa: E402
-from sessions.recording.archive import seal  # noqa: E402
-from sessions.recording.schema import FORMAT_VERSION  # noqa: E402
-from sessions.run.runner import run_session  # noqa: E402
-from sessions.run.steps import AskStroke  # noqa: E402
-
 NORMAL, TANGENTIAL, SPEED = 2.0, 1.0, 20.0  # N, N, mm/s: the ground truth
 
 
