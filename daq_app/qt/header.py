@@ -18,6 +18,7 @@ from daq_app.wording import tr, tr_noop
 
 _ONE_ROW = 1100  # width in which subject and lamp stand beside each other, before the font's scale [px]
 TWO_LINES = 4 * GRID  # of small type, before the font's scale [px]
+_ROOM = 52  # height of the notice's line, before the font's scale [px]
 _LEAST = 2 * GRID  # height of what to do now, where it has no words [px]
 LEGIBLE = 4.0  # s: some twenty words, read at five a second
 _STROKES = tr_noop({1: "stroke away from the subject", -1: "stroke towards the subject", 0: "no stroke asked for"})
@@ -78,7 +79,7 @@ class Notice(Panel):
         self._label = label("", wrap=True)
         self._button = button("", tr("what the notice offers"), self._do)
         self._button.setVisible(False)
-        self.set_collapsible(False)
+        self.setMinimumHeight(px(_ROOM))
         hbox((self._label, 1), self._button, on=self, margins=(2 * GRID, 2, GRID, 2))
 
     def show_view(self, banner: Banner | None, notice: str, step: str = "") -> None:
@@ -106,7 +107,7 @@ class Notice(Panel):
     def set_collapsible(self, collapsible: bool) -> None:
         """Keep the line's place while it is empty; or give it up, where there is no room to keep."""
         self._collapsible = collapsible
-        self.setMinimumHeight(0 if collapsible else px(52))
+        self.setMinimumHeight(0 if collapsible else px(_ROOM))
         self.setVisible(not collapsible or bool(self._label.text()))
 
     def warn(self, sentence: str) -> None:

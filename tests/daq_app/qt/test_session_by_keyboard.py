@@ -182,6 +182,11 @@ def test_a_question_stays_long_enough_to_be_read_while_a_pilot_goes_on(monkeypat
     assert notice.warning == ""
 
 
+@pytest.mark.usefixtures("application")
+def test_a_notice_is_not_seen_before_its_window():
+    assert not Notice(print).isVisible()
+
+
 def test_the_warning_of_a_tablet_gives_way_to_others_and_goes_when_it_answers_again(driver, monkeypatch):
     window, server = driver.window, SimpleNamespace(connected=False)
     driver.begin("P13")
