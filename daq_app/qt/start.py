@@ -172,12 +172,13 @@ def _show_window(build: "Callable[[QApplication], QWidget]") -> int:
     window.show()
     codes: list[int] = []
 
-    def stop(*_: object) -> None:
-        """Close the window as its button does: it asks first where a session is being recorded."""
+    def stop(number: int, _frame: object) -> None:
+        """Close the window as its button does: it asks first while a session is recorded, but not on SIGTERM."""
         codes.append(STOPPED)
-        QTimer.singleShot(0, window.close)
+        QTimer.singleShot(0, lambda: window.close() or number == signal.SIGINT or window.close())
 
     signal.signal(signal.SIGINT, stop)
+    signal.signal(signal.SIGTERM, stop)
     code = application.exec()
     return codes[0] if codes else code
 
