@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from daq_app.window.new_session import Bench, SessionForm, enrolment, refusals
+from daq_app.window.new_session import Bench, Enrolment, SessionForm, enrolment, refusals
 from daq_app.wording import tr, tr_noop
 from sessions.plan.protocols.planning import is_code
 from sessions.plan.study import is_study
@@ -31,10 +31,11 @@ class Card:
 
 def checklist(form: SessionForm, bench: Bench, screen: str) -> tuple[Card, ...]:
     """Return the cards; `screen` says how far the length of the subject's line is known."""
-    wrong = refusals(form, bench)
+    record = enrolment(form)
+    wrong = refusals(form, bench, record)
     notes = {
-        "Study and protocol": _study_note(form),
-        "Subject": _subject_note(form),
+        "Study and protocol": _study_note(form, record),
+        "Subject": _subject_note(form, record),
         "Transducer": "" if not form.forces or not bench.simulated else tr("The simulated bench."),
         "Subject's screen": screen,
     }
@@ -96,9 +97,8 @@ def studies_in(folder: Path) -> tuple[str, ...]:
         return ()
 
 
-def _study_note(form: SessionForm) -> str:
+def _study_note(form: SessionForm, record: Enrolment | None) -> str:
     name = form.study.strip()
-    record = enrolment(form)
     if not name:
         return ""
     if record is not None:
@@ -108,8 +108,7 @@ def _study_note(form: SessionForm) -> str:
     return tr("“{name}” is no study: sessions go to a plain folder, by this page's protocol.", name=name) + elsewhere
 
 
-def _subject_note(form: SessionForm) -> str:
-    record = enrolment(form)
+def _subject_note(form: SessionForm, record: Enrolment | None) -> str:
     if record is not None:
         return record.sentence
     subject = form.subject.strip()

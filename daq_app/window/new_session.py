@@ -156,12 +156,11 @@ def check_form(
     return StartSession(session_plan, str(folder), people, (*page_settings, *settings))
 
 
-def refusals(form: SessionForm, bench: Bench) -> Refusal:
-    """Return everything that keeps a session from beginning."""
+def refusals(form: SessionForm, bench: Bench, record: Enrolment | None) -> Refusal:
+    """Return everything that keeps a session from beginning; `record` is the form's enrolment."""
     wrong = _refusals(form, bench)
     if form.tablet and not form.simulated:
         wrong["tablet"] = form.tablet
-    record = enrolment(form)
     if record is None:
         try:
             protocol(form.protocol)

@@ -98,7 +98,8 @@ def test_a_folder_that_is_a_file_is_refused(tmp_path):
 
 def test_a_folder_below_the_home_of_nobody_or_that_no_file_system_can_hold_is_refused_beside_its_field(tmp_path):
     for folder_name in ("~nobody-of-that-name/recordings", str(tmp_path / ("x" * 300))):
-        assert "folder" in refusals(replace(FORM, folder=folder_name, study="pilot"), REAL)
+        form = replace(FORM, folder=folder_name, study="pilot")
+        assert "folder" in refusals(form, REAL, enrolment(form))
 
 
 def test_sessions_that_were_cut_short_are_listed_whatever_else_lies_in_the_folder(tmp_path):
