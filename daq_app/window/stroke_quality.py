@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
-from importlib import import_module
 
 import numpy as np
 
@@ -110,7 +109,7 @@ class Judge:
         """Start the process, so that the first stroke need not wait for it, and return it."""
         if self._worker is None:
             self._worker = process_pool(1)
-            self._worker.submit(_warm)
+            self._worker.submit(_stand_by)
         return self._worker
 
     def close(self) -> None:
@@ -165,8 +164,6 @@ class Judge:
         self._send(Judged(number, take, answer.result()))
 
 
-def _warm() -> None:
-    """Load what the analysis needs, and let this process go behind window and recorder."""
+def _stand_by() -> None:
+    """Go behind window and recorder; to be asked so, this process has loaded the analysis."""
     give_way()
-    for name in ("scipy.signal", "scipy.special"):
-        import_module(name)
