@@ -228,9 +228,9 @@ def what_is_missing() -> str | None:
         return None
     if not os.environ.get("DISPLAY"):
         return NO_SCREEN
-    for library, package in _LIBRARIES.items():
-        if _load(library) is None:
-            return f"the window needs {library}, which is not on this computer: install the system package {package}"
+    if missing := {library: package for library, package in _LIBRARIES.items() if _load(library) is None}:
+        libraries, packages = ", ".join(missing), " ".join(missing.values())
+        return f"the window needs {libraries}, not on this computer: install the system packages {packages}"
     return None if _display_answers() else f"the display {os.environ['DISPLAY']} does not answer: {NO_SCREEN}"
 
 
