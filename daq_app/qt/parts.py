@@ -1,5 +1,6 @@
 """How labels, buttons and panels of the window are made, so that all of them look and are named alike."""
 
+import re
 from collections.abc import Callable, Iterable
 from typing import TypeVar
 
@@ -45,6 +46,11 @@ def label(text: str = "", role: str = "value", *, wrap: bool = False) -> QLabel:
     return text_label
 
 
+def breakable(text: str) -> str:
+    """Return a text whose lines may end within a long word, which would else widen what it stands in."""
+    return re.sub(r"[^\s/]{30}", "\\g<0>\u200b", text)
+
+
 class Panel(QFrame):
     """A frame with a role of the style sheet and a name for screen readers."""
 
@@ -74,7 +80,7 @@ class WrappedLabel(QLabel):
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
 
     def show_text(self, text: str) -> None:
-        display = text.replace("/", "/\u200b")  # where a line may end
+        display = breakable(text).replace("/", "/\u200b")
         if display != self.text():
             self.setText(display)
             self.setAccessibleName(text)
@@ -258,7 +264,7 @@ def regrade(widget: QWidget, value: str, property_name: str = "grade") -> None:
 
 def set_text(widget: QLabel, text: str, name: str = "", grade: str | None = None) -> None:
     """Show a text. A screen reader says it after the `name` of what it tells; without a name the text alone."""
-    widget.setText(text)  # Qt itself does nothing where it is the same
+    widget.setText(breakable(text) if widget.wordWrap() else text)  # Qt itself does nothing where it is the same
     if name:
         widget.setAccessibleName(f"{name} {text or tr('nothing')}")
     if grade is not None:

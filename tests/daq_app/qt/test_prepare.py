@@ -37,6 +37,20 @@ def test_without_a_transducer_no_field_reaches_beyond_the_page(driver):
         driver.until(lambda: driver.state.bench.link == "open", "the simulated bench")
 
 
+def test_a_name_as_long_as_may_be_typed_widens_no_card(driver):
+    page = driver.window.page
+    try:
+        for line in (page.study, page.folder, page.subject):
+            line.setText("x" * 300)
+        driver.application.processEvents()
+        inside = page.frames["Subject"].parentWidget()
+        assert inside.minimumSizeHint().width() <= inside.parentWidget().width()
+        assert "x" * 300 in page.frames["Study and protocol"].accessibleName()
+    finally:
+        for line, text in ((page.study, ""), (page.folder, "recordings"), (page.subject, "")):
+            line.setText(text)
+
+
 def test_what_is_below_the_top_stays_in_place_while_the_transducer_says_more(driver):
     window, words = driver.window, ("nothing lost", "no readings for 3 s", "no readings for 12 s")
     size, places = window.size(), {}
