@@ -11,7 +11,6 @@ from PySide6.QtCore import QEvent, Qt, QTimer, QUrl, qVersion
 from PySide6.QtGui import QAction, QActionGroup, QDesktopServices, QResizeEvent
 from PySide6.QtWidgets import (
     QFileDialog,
-    QListWidget,
     QListWidgetItem,
     QMainWindow,
     QMenu,
@@ -25,7 +24,7 @@ from PySide6.QtWidgets import (
 from daq_app.qt import preferences
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.keys import KEYS
-from daq_app.qt.parts import Panel, button, hbox, label, vbox
+from daq_app.qt.parts import Panel, button, hbox, label, row_list, vbox
 from daq_app.qt.preferences import name_of, recent_sessions, remember_session
 from daq_app.qt.tokens import GRID, px, theme_of
 from daq_app.window.state import NewSession
@@ -189,8 +188,7 @@ class ReviewRoom(QWidget):
         super().__init__()
         self.analyst: AnalystWindow | None = None
         self._has_room = False  # for the list beside an open session
-        self.recent = QListWidget()
-        self.recent.setAccessibleName(tr("recent sessions"))
+        self.recent = row_list(tr("recent sessions"))
         self.recent.itemActivated.connect(self._open_item)
         self.recent.itemClicked.connect(self._open_item)
         self._none = label(tr("Choose a session at the left, or open one."), "title", wrap=True)

@@ -142,6 +142,17 @@ def test_review_opens_on_the_newest_session_and_a_click_on_another_takes_its_pla
     assert other not in preferences.recent_sessions()  # what is gone is not offered
 
 
+def test_the_name_of_a_session_is_whole_in_the_list(driver, rooms, tmp_path):
+    folder = tmp_path / "P03_a-protocol-of-our-own_20261128T082638-rescued"
+    folder.mkdir()
+    preferences.remember_session(folder)
+    driver.window.act("go to review")
+    driver.application.processEvents()
+    recent = rooms.review.recent
+    assert recent.visualItemRect(recent.item(0)).width() <= recent.viewport().width()
+    assert recent.visualItemRect(recent.item(0)).height() >= 4 * recent.fontMetrics().height()
+
+
 def test_a_session_that_is_open_stays_as_it_is_when_it_is_chosen_again(rooms, monkeypatch):
     monkeypatch.chdir(SESSION.parent)
     rooms.open(Path(SESSION.name))
