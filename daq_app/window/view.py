@@ -1,6 +1,6 @@
 """What the window shows of what it knows: words, numbers and what each button would send. No Qt."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from typing import Literal
 
@@ -102,6 +102,8 @@ def bench_summary(view: BenchView) -> str:
 def bench_view(bench: BenchState, *, recording: bool, unheard: float = 0.0) -> BenchView:
     """Return what is shown of the bench; `recording` keeps it connected, `unheard` is the last report's age [s]."""
     info = bench.info
+    if unheard > SILENT:
+        bench = replace(bench, silence=bench.silence + unheard)
     lamp, lamp_text = _bench_lamp(bench, recording=recording)
     counts, lag = asdict(bench.health), f"{bench.health.lag_ms:.0f} ms"
     open_now = bench.link == "open"
@@ -112,7 +114,7 @@ def bench_view(bench: BenchState, *, recording: bool, unheard: float = 0.0) -> B
         serial="–" if info is None else info.serial,
         calibration="–" if info is None else info.calibration.source,
         rate=_rate(bench),
-        silent=bench.link != "open" or _is_silent(bench) or unheard > SILENT,
+        silent=bench.link != "open" or _is_silent(bench),
         counters=(*((COUNT_LABELS[name], f"{counts[name]}") for name in ("received", *COUNTERS)), ("lag", lag)),
         bars=_bars(bench),
         tare=_tare(bench),
@@ -332,7 +334,12 @@ def _banner(state: AppState) -> Banner | None:
     if sentence_text := _no_readings(bench, running=running):
         return Banner("wrong", sentence_text)
     if running and (age := _unheard(state)) > SILENT:
-        return Banner("wrong", tr("Nothing was heard from the recorder for {age:.0f} s.", age=age))
+        warning = tr(
+            "Nothing was heard from the recorder for {age:.0f} s: this computer or its disk may be busy. "
+            "End other programs; what was saved is safe.",
+            age=age,
+        )
+        return Banner("wrong", warning)
     if overloads := bench.peak.overloads:
         axes = ", ".join(tr(axis) for axis in overloads)
         warning = tr("Overload on {axes}: take the load off and check the transducer.", axes=axes)

@@ -235,7 +235,9 @@ def test_a_recorder_that_is_silent_in_a_session_is_said_to_be_silent():
 def test_no_reading_counts_as_of_now_once_the_recorder_is_dead_or_not_heard():
     state = after(Tick(100.0), *MOUNT, health_report((0.1,) * 7), Tick(101.0))
     assert not derive_view(state).bench.silent
-    assert derive_view(after(Tick(105.0), state=state)).bench.silent
+    unheard = derive_view(after(Tick(105.0), state=state)).bench
+    assert unheard.silent
+    assert (unheard.lamp, unheard.lamp_text) == ("wrong", "no readings for 5 s")
     assert derive_view(after(m.Gone(False, "signal 9"), state=state)).bench.silent
     assert derive_view(after(m.Disconnect(), m.NoDevice(), state=state)).bench.silent
 
