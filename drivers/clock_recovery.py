@@ -253,7 +253,7 @@ class ScanCount:
     """
 
     def __init__(self, rate: float, factor: float = 1.0, *, wrap: int = 0) -> None:
-        """Expect `rate` scans a second [Hz] of a clock `factor` times real; losses are known up to `wrap` times n."""
+        """Expect `rate` scans a second [Hz] of a clock `factor` times real time; losses are known modulo `wrap`."""
         self.lost = 0
         self.watch = RateWatch(rate, factor, GAP * factor + 10.0 / rate)
         self._rate = rate

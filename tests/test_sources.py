@@ -223,6 +223,19 @@ def test_a_private_name_taken_from_elsewhere_is_found():
 # ---- nothing listens on the network, and nothing that can run is read
 
 
+def test_no_class_holds_a_partial_that_newer_pythons_bind_to_its_objects(trees):
+    """From Python 3.14 on such a `functools.partial` gets the object as its first argument, and 3.13 warns of it."""
+    places = [
+        f"{file}:{line.lineno}"
+        for file, tree in trees.items()
+        for body in of_kind(tree, ast.ClassDef)
+        for line in body.body
+        if isinstance(line, ast.Assign | ast.AnnAssign) and isinstance(line.value, ast.Call)
+        if getattr(line.value.func, "attr", getattr(line.value.func, "id", "")) == "partial"
+    ]
+    assert places == []
+
+
 def called(tree):
     """Names of what is called."""
     for node in of_kind(tree, ast.Call):

@@ -137,7 +137,7 @@ class _GaugeConversation:
     serial: int
     constants: wire.Constants
     scan_clock: wire.ScanClock
-    numbering = partial(ScanCount, wrap=_WRAP)
+    numbering = staticmethod(partial(ScanCount, wrap=_WRAP))
 
     def decoder(self) -> RecordDecoder:
         return wire.StreamDecoder(self.constants)
