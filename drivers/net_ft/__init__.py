@@ -75,11 +75,13 @@ def _prepare(target: _Target, deadline: Deadline) -> TransducerInfo:
     if not configuration.streams:
         uri = target.address.uri
         raise SetupError(f"{uri}: the box's RDT output is disabled; enable it on its Communications page")
-    info = configuration.info
-    if target.rate is not None and not _is_rate(info, target.rate):
+    if target.rate is not None and not _is_rate(configuration.info, target.rate):
         answer = http_get(target.host, target.http_port, f"/comm.cgi?comrdtrate={target.rate}", deadline)
-        if answer.status not in (200, 302) or not _is_rate(info := _configuration(target, deadline).info, target.rate):
-            state = "shows no rate at all" if math.isnan(info.rate) else f"stays at {info.rate:g} Hz"
+        if answer.status in (200, 302):
+            configuration = _configuration(target, deadline)
+        rate = configuration.info.rate
+        if not _is_rate(configuration.info, target.rate):
+            state = "shows no rate at all" if math.isnan(rate) else f"stays at {rate:g} Hz"
             raise SetupError(
                 f"{target.address.uri}: the box was asked for {target.rate} Hz but {state}; "
                 "set the rate on its Communications page"
@@ -87,7 +89,7 @@ def _prepare(target: _Target, deadline: Deadline) -> TransducerInfo:
     results = _command(target, configuration, deadline) if target.set_bias or target.reset_latch else {}
     if target.buffered:
         results["streaming"] = "buffered"
-    return replace(info, settings={**info.settings, **results})
+    return replace(configuration.info, settings={**configuration.info.settings, **results})
 
 
 def _command(target: _Target, configuration: Configuration, deadline: Deadline) -> dict[str, str]:

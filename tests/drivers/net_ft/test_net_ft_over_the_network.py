@@ -21,6 +21,7 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import LinkLost, SetupError
 from simulators.bench import Bench
 from simulators.faults import Fault, Faults
+from simulators.net_ft_electronics import Pages
 
 
 def port(uri, name):
@@ -204,6 +205,14 @@ def test_a_box_that_is_not_as_asked_is_refused_with_its_address_and_the_reason(s
     with contextlib.closing(web(status, body)) as server, pytest.raises(SetupError, match=reason) as refusal:
         open_transducer(server.uri + options, RealClock())
     assert server.uri + options in str(refusal.value)
+
+
+def test_a_box_that_counts_otherwise_from_its_new_rate_on_is_taken_as_it_counts_now(start_box, monkeypatch):
+    monkeypatch.setattr(Pages, "counts", property(lambda pages: 2_000_000 if pages.step == 14 else 1_000_000))
+    box = start_box()
+    info = open_transducer(f"{box.uri}&rate=500&bias=set", PacedClock(10.0)).info
+    assert info.rate == 500.0
+    np.testing.assert_allclose(np.diag(info.calibration.matrix), [0.5e-6] * 3 + [0.5e-3] * 3)
 
 
 def test_what_is_not_simulated_does_not_say_so():
