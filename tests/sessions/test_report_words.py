@@ -149,6 +149,28 @@ def test_a_width_that_was_set_is_not_called_assumed(report):
         assert f"times a width of 15 mm ({origin})" in caption
 
 
+def test_a_depth_without_an_interval_says_whether_its_mesh_is_rough_or_no_interval_was_asked_for(report):
+    """--intervals alone gives none to a depth that was not solved for: that takes --variants."""
+    first, unasked = report.predictions[0], {"interval": None, "matching_depth_interval": None}
+    by_force = tuple(
+        replace(a, interval=None, indentation=first.matching_depth if a.variant == FORCE else a.indentation)
+        for a in first.alternatives
+    )
+    for alternatives, why in (((), "found on a rough mesh"), (by_force, "none was asked for (--intervals)")):
+        prediction = replace(first, alternatives=alternatives, **unasked)
+        table = of_predictions.force_table(replace(report, predictions=(prediction,)))
+        assert table.groups[0].rows[0][-1].note.startswith(f"no interval: {why}")
+
+
+def test_every_number_of_a_variant_whose_interval_was_not_asked_for_says_so(report):
+    unasked = tuple(
+        replace(p, alternatives=tuple(replace(a, interval=None) for a in p.alternatives)) for p in report.predictions
+    )
+    for table in (of_predictions.variants_table, of_predictions.variant_forces_table):
+        rows = table(replace(report, predictions=unasked)).groups[0].rows
+        assert {cell.note for row in rows for cell in row[2:]} == {"no interval: none was asked for (--intervals)"}
+
+
 def test_an_exact_p_below_a_thousandth_is_not_shown_as_zero(report):
     sticky = report.experiments[0]
     small = replace(sticky.score_relation, spearman_p=2.0 / 3_628_800)  # ten surfaces in perfect order: 2 of 10!

@@ -154,12 +154,9 @@ def variant_forces_table(report: Report) -> Table | None:
         value = alternative.indentation if pressed else alternative.normal_force
         error = alternative.indentation_error if pressed else alternative.normal_force_error
         value = None if alternative.sed is None else value
-        intervals = alternative.interval
-        interval = without = None
-        if intervals is not None:
-            interval = intervals.indentation if pressed else intervals.normal_force
-            without = intervals.reason
-        estimate = _Estimate(value, error, alternative.reason, interval, without, alternative.doubt)
+        bands = alternative.interval
+        interval = None if bands is None else bands.indentation if pressed else bands.normal_force
+        estimate = _Estimate(value, error, alternative.reason, interval, _limits(bands)[1], alternative.doubt)
         return _cell(estimate, places(2), 2)
 
     units = {variant.conditions: "mm" if variant.driven == "force" else "N" for variant in _variants(report)}
@@ -204,7 +201,9 @@ def force_table(report: Report) -> Table | None:
             value: float | None = getattr(prediction, name)
             return _cell(_Estimate(value, error, reason, interval, without, doubt), places(decimals), decimals)
 
-        matching_interval = prediction.matching_depth_interval
+        depth = prediction.matching_depth
+        by_force = (a for a in prediction.alternatives if a.variant.driven == "force" and a.indentation == depth)
+        without_depth = next((_limits(alternative.interval)[1] for alternative in by_force), _ROUGH)
         return (
             cell("normal_per_mm", prediction.normal_force_error, per_mm, without, 4),
             cell("normal_force", prediction.normal_force_error, normal, without),
@@ -212,7 +211,7 @@ def force_table(report: Report) -> Table | None:
             cell("tangential_force", prediction.tangential_force_error, tangential, without),
             cell("measured_tangential", None, intervals.get("tangential_force"), TOO_SHORT),
             _depth(prediction),
-            cell("matching_depth", prediction.matching_depth_error, matching_interval, without or _ROUGH),
+            cell("matching_depth", prediction.matching_depth_error, prediction.matching_depth_interval, without_depth),
         )
 
     origin = f" ({report.width_origin})" if report.width_origin else ""
