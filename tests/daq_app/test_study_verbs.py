@@ -63,6 +63,15 @@ def test_a_blinded_session_away_from_its_study_is_unblinded_with_the_study_that_
     assert run(["unblind", str(away), "--by", "E02", "--study", str(friction)]) == 0
 
 
+def test_a_study_whose_only_session_was_unblinded_alone_is_unblinded_without_a_flaw(study, tmp_path, capsys):
+    friction = shutil.copytree(study, tmp_path / "friction")
+    for name in ("P01_scores", "P02_scores"):
+        shutil.rmtree(friction / name)
+    assert run(["unblind", str(friction / "P01_forces"), "--by", "E02"]) == 0
+    code, result = run_json(capsys, "unblind", friction, "--by", "E02")
+    assert (code, result["sessions"], result["left_out"]) == (0, [], [])
+
+
 def test_a_session_that_cannot_be_written_stays_blinded_and_the_others_are_opened(study, tmp_path, capsys):
     friction = shutil.copytree(study, tmp_path / "friction")
     (friction / "P01_forces" / "unblinding.json").mkdir()

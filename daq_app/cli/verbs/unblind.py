@@ -35,7 +35,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     key = study_key(folder) if is_study_folder or sessions[0].plan.blinded else None
     if key is None:
         raise StudyError(f"{path} is not blinded: there is nothing to open")
-    recordings, refusals = _select(sessions, key)
+    recordings, refusals = _select(sessions, key, alone=not is_study_folder)
     refusals += unreadable
     if not is_study_folder and refusals:
         raise RecordingError(refusals[0])
@@ -59,22 +59,22 @@ def run(options: argparse.Namespace, console: Console) -> int:
                 raise
             refusals.append(str(error))
     console.result({"study": str(folder), "sessions": names, "left_out": refusals, "by": options.by, "utc": utc})
-    console.say(f"unblinded by {options.by}: {', '.join(names) or 'no session yet'}", *refusals)
+    console.say(f"unblinded by {options.by}: {', '.join(names) or 'the study alone'}", *refusals)
     if not is_study_folder:
         console.say("labels are the same throughout the study: whoever saw this session's stimuli knows them all")
     return FLAWED if refusals else DONE
 
 
-def _select(sessions: tuple[Recording, ...], key: Key) -> tuple[list[Recording], list[str]]:
-    """Return the sessions to be unblinded, and a sentence for each that cannot be."""
+def _select(sessions: tuple[Recording, ...], key: Key, *, alone: bool) -> tuple[list[Recording], list[str]]:
+    """Return the sessions to be unblinded, and a sentence for each that cannot be; `alone`: one that was asked for."""
     recordings: list[Recording] = []
     refusals: list[str] = []
     for recording in sessions:
         name = recording.folder.name
         if not recording.plan.blinded:
-            refusals += [] if len(sessions) > 1 else [f"{name} is not blinded"]
+            refusals += [f"{name} is not blinded"] if alone else []
         elif load_derived(recording.folder, UNBLINDING) is not None:
-            refusals += [] if len(sessions) > 1 else [f"{name} was unblinded before"]
+            refusals += [f"{name} was unblinded before"] if alone else []
         elif recording.plan.key_sha256 != key.sha256:
             refusals.append(f"{name} was blinded with another key: name its study with --study")
         elif not is_sealed(recording.folder):
