@@ -236,7 +236,9 @@ def test_a_decision_is_recorded_listed_followed_by_every_verb_and_undone(small, 
     window = [str(start + 0.2), str(stop - 0.3)]
     decide = ["decide", str(small), "--by", "E02", "--why", "a ramp", "--json"]
     assert run([*decide, "--trial", "1", "--steady", *window]) == 0
-    assert answer(capsys)["decision"]["old"] == [start, stop]
+    moved = answer(capsys)
+    assert moved["decision"]["old"] == [start, stop]
+    assert re.search(r"speed \S+ -> \S+ mm/s", moved["changes"][0])
     assert run([*decide, "--trial", "2", "--drop"]) == 0
     assert answer(capsys)["changes"] == ["stroke 1 of trial 2: the model does not get it"]
     run(["analyse", str(small), "--json"])

@@ -20,6 +20,7 @@ from sessions.recording.derived import gain_error_set
 from sessions.strokes import Analysis, analyse
 from sessions.strokes.analysis import preview, with_present
 from sessions.strokes.decisions import Decision, DecisionError, Decisions, append, read
+from sessions.strokes.stroke import Stroke, meanings
 
 EXAMPLE = 'daq-app decide recordings/P07 --trial 4 --steady 31.2 32.6 --by E02 --why "the ramp was in it"'
 CHANGING = ("mu_static", "mu_dynamic", "mu_max", "tau_max", "speed", "direction", "break_away", "slide_onset")
@@ -119,10 +120,15 @@ def _list(decisions: Decisions, console: Console) -> int:
 def _changes(old_analysis: Analysis, new_analysis: Analysis) -> list[str]:
     """Return a sentence for each stroke whose numbers a decision changes."""
     sentences: list[str] = []
+    units = meanings(Stroke)
     strokes = [{friction.stroke for friction in analysis.friction} for analysis in (old_analysis, new_analysis)]
     for index, (old_stroke, new_stroke) in enumerate(zip(old_analysis.strokes, new_analysis.strokes, strict=False)):
         pairs = ([number(getattr(stroke, name), 4) for stroke in (old_stroke, new_stroke)] for name in CHANGING)
-        texts = [f"{name} {old} -> {new}" for name, (old, new) in zip(CHANGING, pairs, strict=True) if old != new]
+        texts = [
+            f"{name} {old} -> {new} {units[name].unit}".rstrip()
+            for name, (old, new) in zip(CHANGING, pairs, strict=True)
+            if old != new
+        ]
         if (index in strokes[0]) != (index in strokes[1]):
             texts.append("the model gets it" if index in strokes[1] else "the model does not get it")
         if texts:
