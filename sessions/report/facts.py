@@ -16,7 +16,7 @@ from sessions.recording.manifest import file_sha256
 from sessions.recording.reader import Recording
 from sessions.recording.schema import LIVE_FILE
 from sessions.report.contents import Fact, StrokeFinding, TextFile
-from sessions.report.wording import direction, full_stop
+from sessions.report.wording import correlation, direction, full_stop
 from sessions.statistics.multiverse import PATHS, Values
 from sessions.statistics.scores import ScoreTable, grades_of, reversed_subjects
 from sessions.strokes.analysis import Analysis
@@ -229,8 +229,8 @@ def remarks(recording: Recording, analysis: Analysis, tables: Sequence[ScoreTabl
         elif record.outcome == "open":
             sentences.append(f"Trial {number} was not done: the session ended before.")
     sentences += [
-        f"The {descriptor} scores of {subject} fall as the index rises (r = {r:+.2f}): the scale may have been used "
-        "backwards; they are kept as given."
+        f"The {descriptor} scores of {subject} fall as the index rises (r = {correlation(r)}): the scale may have been "
+        "used backwards; they are kept as given."
         for subject, descriptor, r in reversed_subjects(tables)
     ]
     return tuple(sentences)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 
 import numpy as np
@@ -93,6 +94,7 @@ def test_the_verb_prints_signs_map_shares_and_indices(tmp_path, capsys):
     assert "receptor 0.25 mm distal" in output
     assert "no slide" in output  # at finite strain
     assert "+\N{MINUS SIGN}" in output
+    assert not re.search(r"-\d", output)  # of the numbers too
 
 
 def test_nonsense_is_refused_in_a_sentence(tmp_path, capsys):

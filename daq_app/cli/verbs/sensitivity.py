@@ -36,6 +36,8 @@ from sessions.file_access import remedy
 from sessions.prediction import QUANTITIES
 from sessions.prediction.surface_series import SERIES
 from sessions.recording import RecordingError
+from sessions.report.wording import correlation
+from sessions.strokes.stroke import digits
 from sessions.toml_file import load_toml, tables_in, text_of
 from solver import Scene
 
@@ -194,7 +196,7 @@ def _cells(answer: Answer | str, series: str, column: int) -> tuple[str, str]:
     with_index, change = (statistic[0][column] for statistic in answer[series])
     if with_index is None or change is None:
         return "no slide", "–"
-    return f"{with_index:+.2f}", f"{100 * change:+.0f} %"
+    return correlation(with_index), f"{100 * change:+.0f} %".replace("-", "−")
 
 
 def _print_map(radii: dict[float, Answer | str], column: int, console: Console) -> None:
@@ -206,7 +208,7 @@ def _print_map(radii: dict[float, Answer | str], column: int, console: Console) 
         [f"{radius:g}", *(_mark(answer, position, column) for position in range(len(sign_map.PLACES)))]
         for radius, answer in radii.items()
     ]
-    console.say(table(rows, header=["", *(f"{position:g}" for position in sign_map.PLACES)]))
+    console.say(table(rows, header=["", *(f"{position:g}".replace("-", "−") for position in sign_map.PLACES)]))
 
 
 def _mark(answer: Answer | str, position: int, column: int) -> str:
@@ -231,8 +233,8 @@ def _index_table(indices: Sequence[Index]) -> str:
         [
             index.name,
             f"{number(index.low)} to {number(index.high)}",
-            f"{index.first:.2f} ± {index.first_error:.2f}",
-            f"{index.total:.2f} ± {index.total_error:.2f}",
+            f"{digits(index.first, 2)} ± {index.first_error:.2f}",
+            f"{digits(index.total, 2)} ± {index.total_error:.2f}",
         ]
         for index in indices
     ]
