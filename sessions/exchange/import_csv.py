@@ -258,7 +258,7 @@ def _table(path: Path, content: bytes, options: ImportOptions) -> tuple[Columns,
         rows.append(_row(path, number, record, len(cells), column_names))
         lines.append(number)
     if len(rows) < _FEWEST:
-        raise ImportRefused(f"{path} holds {len(rows)} readings: give a file with at least {_FEWEST}")
+        raise ImportRefused(f"{path} holds fewer than {_FEWEST} readings: give the file of a whole recording")
     return layout, np.array(rows), lines
 
 

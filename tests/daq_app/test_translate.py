@@ -15,7 +15,7 @@ from sessions.plan.protocols.protocol import FOLDER, protocol
 def test_tables_filled_in_at_the_end_of_a_protocol_are_its_new_language(tmp_path, capsys):
     out, own = tmp_path / "nl.toml", tmp_path / "ours.toml"
     assert run(["translate", "sensotact-friction", "--language", "nl", "--out", str(out)]) == 0
-    assert "texts yet to be translated: 3" in capsys.readouterr().err
+    assert "tables yet to be translated: 3" in capsys.readouterr().err
     translated_tables = out.read_text().replace("Put your index finger", "Leg uw wijsvinger")
     own.write_text((FOLDER / "sensotact-friction.toml").read_text() + translated_tables)
     session_plan = plan(protocol(own), "S01", 1, setting=VisitSetting(language="nl"))

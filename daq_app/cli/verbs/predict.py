@@ -37,7 +37,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     meaning = "scene file with another finger; friction and loading are the trials'"
     parser.add_argument("--scene", type=Path, metavar="FILE", help=meaning)
-    parser.add_argument("--indentation", type=float, metavar="MM", help="instead of each block's own")
+    span = (1e-6, 10.0)  # as a block's
+    add_number(
+        parser, "--indentation", float, span, "instead of each block's own", None, "MM", "above 0, up to 10 (mm)"
+    )
     add_flag(parser, "--intervals", "also what the uncertainty of friction makes of each SED (more solves)")
     meaning = "also firing rates and spike times of an SA-II afferent that answers to that quantity: an illustration"
     add_flag(parser, "--afferent", meaning)

@@ -54,7 +54,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
             write_whole(options.out, text.encode())
     destination = {"out": None, "text": text} if options.out is None else {"out": str(options.out)}
     console.result({"language": options.language, "missing": gaps, **destination})
-    console.note(f"texts yet to be translated: {gaps}" if gaps else "every text is translated")
+    unit = "texts" if options.program or options.window else "tables"
+    console.note(f"{unit} yet to be translated: {gaps}" if gaps else "every text is translated")
     return DONE
 
 
