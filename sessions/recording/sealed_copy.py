@@ -245,30 +245,29 @@ def _event_texts(recording: Recording) -> Iterator[str]:
 def _trials(recording: Recording) -> Iterator[DataSet]:
     records = recording.trials
     trials = [record.trial for record in records]
-    stimuli = [trial.stimulus for trial in trials]
+    indices = [-1 if t.stimulus.index is None else t.stimulus.index for t in trials]
     scores = np.array([math.nan if r.score is None else r.score for r in records], "<f8")
     numbers = np.array([math.nan if r.number is None else r.number for r in records], "<f8")
-    choices = _int64([{None: 0, "first": 1, "second": 2}[r.choice] for r in records])
-    yield DataSet("trials/number", _int64([t.number for t in trials]), "", "from 1, in the planned order")
-    yield DataSet("trials/block", texts([t.block for t in trials]), "", "name of the block")
-    yield DataSet("trials/descriptor", texts([stimulus.descriptor for stimulus in stimuli]), "", "what was judged")
-    indices = _int64([-1 if stimulus.index is None else stimulus.index for stimulus in stimuli])
-    yield DataSet("trials/index", indices, "", "the maker's number of the stimulus, 0 to 100; -1 where it was sealed")
-    yield DataSet("trials/code", texts([stimulus.code for stimulus in stimuli]), "", "label on the stimulus")
-    yield DataSet("trials/direction", _int64([t.direction for t in trials]), "", "+1 proximal to distal, -1 back")
-    yield DataSet("trials/repetition", _int64([t.repetition for t in trials]), "", "from 1")
-    yield DataSet("trials/phase", texts([t.phase for t in trials]), "", "main; or practice, pre-evaluation")
-    yield DataSet("trials/outcome", texts([r.outcome for r in records]), "", OUTCOMES)
-    yield DataSet("trials/score", scores, "", "0 to 100; NaN unless the outcome is scored")
-    yield DataSet("trials/free_number", numbers, "", "on the subject's own scale; NaN unless the outcome is numbered")
-    yield DataSet("trials/choice", choices, "", "1 or 2 of the two compared; 0 unless the outcome is chosen")
-    partners = [t.compared_with or 0 for t in trials]
-    yield DataSet("trials/compared_with", _int64(partners), "", "number of the first of two; 0 for none")
-    yield DataSet(
-        "trials/take", _int64([r.take.number if r.take else 0 for r in records]), "", "that counts; 0 for none"
-    )
-    yield DataSet("trials/start_ns", _int64([r.start_ns or 0 for r in records]), "ns", "of that take, session clock")
-    yield DataSet("trials/stop_ns", _int64([r.stop_ns or 0 for r in records]), "ns", "of that take, session clock")
+    choices = [{None: 0, "first": 1, "second": 2}[r.choice] for r in records]
+    for name, values, unit, note in (
+        ("number", [t.number for t in trials], "", "from 1, in the planned order"),
+        ("block", texts([t.block for t in trials]), "", "name of the block"),
+        ("descriptor", texts([t.stimulus.descriptor for t in trials]), "", "what was judged"),
+        ("index", indices, "", "the maker's number of the stimulus, 0 to 100; -1 where it was sealed"),
+        ("code", texts([t.stimulus.code for t in trials]), "", "label on the stimulus"),
+        ("direction", [t.direction for t in trials], "", "+1 proximal to distal, -1 back"),
+        ("repetition", [t.repetition for t in trials], "", "from 1"),
+        ("phase", texts([t.phase for t in trials]), "", "main; or practice, pre-evaluation"),
+        ("outcome", texts([r.outcome for r in records]), "", OUTCOMES),
+        ("score", scores, "", "0 to 100; NaN unless the outcome is scored"),
+        ("free_number", numbers, "", "on the subject's own scale; NaN unless the outcome is numbered"),
+        ("choice", choices, "", "1 or 2 of the two compared; 0 unless the outcome is chosen"),
+        ("compared_with", [t.compared_with or 0 for t in trials], "", "number of the first of two; 0 for none"),
+        ("take", [r.take.number if r.take else 0 for r in records], "", "that counts; 0 for none"),
+        ("start_ns", [r.start_ns or 0 for r in records], "ns", "of that take, session clock"),
+        ("stop_ns", [r.stop_ns or 0 for r in records], "ns", "of that take, session clock"),
+    ):
+        yield DataSet(f"trials/{name}", _int64(values) if isinstance(values, list) else values, unit, note)
 
 
 def _different_readings(recording: Recording, file: h5py.File) -> Iterator[str]:

@@ -190,9 +190,9 @@ def _mounts() -> Sequence[Mount]:
 
 def _program_by_mark(location: Path) -> str | None:
     """Return the synchronising program whose marker file lies in `location` or above it; None where there is none."""
-    for folder in (location, *location.parents):
+    for folder in (location, *location.parents)[:-1]:  # nobody synchronises the root
         try:
-            names = {entry.name for entry in folder.iterdir()} if folder != folder.parent else set[str]()
+            names = {entry.name for entry in folder.iterdir()}
         except OSError:
             continue
         for mark, program in SYNC_MARKS:
