@@ -255,15 +255,14 @@ def _blocks(files: Iterable[Path]) -> Iterator[ReadingBlock]:
 
 
 def _write_table(stem: Path, table: Table, recording: Recording, extra: Mapping[str, Any] | None = None) -> None:
-    table_columns = table.columns
     if recording.simulated:
-        table_columns = (*table_columns, replace(_MARK, values=(1,) * len(table.rows)))
+        table = replace(table, columns=(*table.columns, replace(_MARK, values=(1,) * len(table.rows))))
     with stem.with_name(f"{stem.name}.tsv").open("w", encoding="utf-8", newline="") as file:
-        for row in ([column.heading for column in table_columns], *Table("", "", table_columns).rows):
+        for row in ([column.heading for column in table.columns], *table.rows):
             # Tabs and line ends have no place in a cell, and a BIDS table knows no quotes.
             texts = ("" if cell is None else re.sub(r"[\t\r\n]+", " ", str(cell)) for cell in row)
             file.write("\t".join(text or NOT_AVAILABLE for text in texts) + "\n")
-    headings = {column.heading: _describe(column) for column in table_columns if column.heading not in _BIDS_COLUMNS}
+    headings = {column.heading: _describe(column) for column in table.columns if column.heading not in _BIDS_COLUMNS}
     sidecar = {**recording.mark, "Description": table.meaning, **(extra or {}), **headings}
     write_json(stem.with_name(f"{stem.name}.json"), sidecar)
 

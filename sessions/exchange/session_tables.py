@@ -10,7 +10,7 @@ import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from sessions.exchange import ExportSource
 from sessions.prediction import Scene, TrialPrediction
@@ -352,17 +352,19 @@ def _names(column: str) -> tuple[str, ...]:
 def _flat(row: Mapping[str, Any]) -> Iterable[tuple[str, Cell]]:
     """Yield the cells of a row: pairs and stimuli as several, texts joined, other lists as JSON."""
     for name, value in row.items():
-        if len(names := _names(name)) > 1:
-            yield from zip(names, value or (None, None), strict=True)
-        elif isinstance(value, (list, tuple)) and all(isinstance(item, str) for item in cast("Sequence[Any]", value)):
-            yield name, "; ".join(cast("Sequence[str]", value)) or None
-        elif isinstance(value, Mapping) and name == "stimulus":
-            yield from ((f"{name}_{item}", cell) for item, cell in cast("Mapping[str, Cell]", value).items())
-        elif isinstance(value, Mapping):
-            yield name, "; ".join(f"{key}: {item}" for key, item in cast("Mapping[str, Any]", value).items()) or None
-        elif isinstance(value, (list, tuple)):
-            yield name, json.dumps(value, ensure_ascii=False) if value else None
-        elif isinstance(value, bool):
-            yield name, "true" if value else "false"
-        else:
-            yield name, value
+        names = _names(name)
+        match value:
+            case _ if len(names) > 1:
+                yield from zip(names, value or (None, None), strict=True)
+            case {} if name == "stimulus":
+                yield from ((f"{name}_{item}", cell) for item, cell in value.items())
+            case {}:
+                yield name, "; ".join(f"{key}: {item}" for key, item in value.items()) or None
+            case [*items] if all(isinstance(item, str) for item in items):
+                yield name, "; ".join(items) or None
+            case [*items]:
+                yield name, json.dumps(items, ensure_ascii=False)
+            case bool():
+                yield name, "true" if value else "false"
+            case _:
+                yield name, value
