@@ -52,18 +52,14 @@ def _in_variant(report: Report, variant: Variant, condition: str) -> str:
     def sed(prediction: PredictionFinding) -> float | None:
         return next((a.sed for a in prediction.alternatives if a.variant == variant), None)
 
-    names = {p.experiment for p in report.predictions if any(a.variant == variant for a in p.alternatives)}
-    in_doubt = by_key(
-        (p.experiment, any(a.doubt for a in p.alternatives if a.variant == variant)) for p in report.predictions
-    )
-    clauses = [
-        f"{experiment.name} {text}, n = {plural(fit.n, 'stimulus', 'stimuli')}{_doubt(in_doubt[experiment.name])}"
-        for experiment in report.experiments
-        if experiment.name in names
-        for fit in [_relation(report, experiment, sed)]
-        for r in [fit.pearson]
-        for text in [fit.reason if r is None else f"r = {correlation(r)}{ends_of(fit)}"]
-    ]
+    tried = by_key((p.experiment, a) for p in report.predictions for a in p.alternatives if a.variant == variant)
+    clauses: list[str] = []
+    for experiment in report.experiments:
+        if alternatives := tried.get(experiment.name):
+            fit = _relation(report, experiment, sed)
+            text = fit.reason if fit.pearson is None else f"r = {correlation(fit.pearson)}{ends_of(fit)}"
+            doubt = _doubt([bool(alternative.doubt) for alternative in alternatives])
+            clauses.append(f"{experiment.name} {text}, n = {plural(fit.n, 'stimulus', 'stimuli')}{doubt}")
     if not clauses:
         sizes = [fact.value for fact in report.left_out if condition.endswith(fact.name) and fact.value != NO_ESTIMATE]
         change = f": the change is estimated at {sizes[0]}" if sizes else ""

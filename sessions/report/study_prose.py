@@ -160,10 +160,11 @@ def remarks(study: StudyFindings) -> list[str]:
     ]
     sessions = by_key((v.subject, v.session) for v in study.visits if any(row.score is not None for row in v.rows))
     several = [f"{subject} in {', '.join(names)}" for subject, names in sessions.items() if len(names) > 1]
-    sentences += [
-        f"Scored in more than one session: {_first_few(several)}. In means a surface has the subject's mean score; "
-        "within subjects every trial counts. Two people under one code would look the same."
-    ] * bool(several)
+    if several:
+        sentences.append(
+            f"Scored in more than one session: {_first_few(several)}. In means a surface has the subject's mean score; "
+            "within subjects every trial counts. Two people under one code would look the same."
+        )
     for outcome, opening in (("not answered", "No score, for the subject did not answer"), ("open", "Not done")):
         trials = [f"{v.session} trial {r.trial}" for v in study.visits for r in v.rows if r.outcome == outcome]
         sentences += [f"{opening}: {_first_few(trials)}."] if trials else []

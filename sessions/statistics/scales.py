@@ -109,7 +109,7 @@ def consistence(choices: Sequence[Choice]) -> Mapping[str, Consistence]:
     A pair chosen equally often both ways leaves its subject out, for it has no direction.
     """
     results: dict[str, Consistence] = {}
-    pairs = ((choice.subject, (choice.first, choice.second)[:: 1 if choice.first_chosen else -1]) for choice in choices)
+    pairs = ((c.subject, (c.first, c.second) if c.first_chosen else (c.second, c.first)) for c in choices)
     for subject, answers in sorted(by_key(pairs).items()):
         won = Counter(answers)  # by the surface that was chosen and the other
         indices = sorted({index for pair in won for index in pair})
@@ -119,7 +119,7 @@ def consistence(choices: Sequence[Choice]) -> Mapping[str, Consistence]:
         wins = Counter(pair[0] if lead > 0 else pair[1] for pair, lead in leads.items())
         n = len(indices)
         triads = math.comb(n, 3) - sum(math.comb(wins[index], 2) for index in indices)
-        most = (n**3 - n) // 24 if n % 2 else (n**3 - 4 * n) // 24
+        most = (n**3 - (n if n % 2 else 4 * n)) // 24
         results[subject] = Consistence(triads, most, 1.0 - triads / most)
     return results
 

@@ -121,16 +121,12 @@ def _changes(old_analysis: Analysis, new_analysis: Analysis) -> list[str]:
     """Return a sentence for each stroke whose numbers a decision changes."""
     sentences: list[str] = []
     units = meanings(Stroke)
-    strokes = [{friction.stroke for friction in analysis.friction} for analysis in (old_analysis, new_analysis)]
+    of_model, new_of_model = ({friction.stroke for friction in a.friction} for a in (old_analysis, new_analysis))
     for index, (old_stroke, new_stroke) in enumerate(zip(old_analysis.strokes, new_analysis.strokes, strict=False)):
-        pairs = ([number(getattr(stroke, name), 4) for stroke in (old_stroke, new_stroke)] for name in CHANGING)
-        texts = [
-            f"{name} {old} -> {new} {units[name].unit}".rstrip()
-            for name, (old, new) in zip(CHANGING, pairs, strict=True)
-            if old != new
-        ]
-        if (index in strokes[0]) != (index in strokes[1]):
-            texts.append("the model gets it" if index in strokes[1] else "the model does not get it")
+        numbers = ((name, *(number(getattr(s, name), 4) for s in (old_stroke, new_stroke))) for name in CHANGING)
+        texts = [f"{name} {old} -> {new} {units[name].unit}".rstrip() for name, old, new in numbers if old != new]
+        if (index in of_model) != (index in new_of_model):
+            texts.append("the model gets it" if index in new_of_model else "the model does not get it")
         if texts:
             trial = "" if new_stroke.trial is None else f" of trial {new_stroke.trial}"
             sentences.append(f"stroke {new_stroke.number}{trial}: {', '.join(texts)}")

@@ -283,15 +283,14 @@ def comparison_panel(
         return None
     picture = sheet(560, 150 * len(names) + 60, tuple(1.0 for _ in names), share_x=True)
     for row, (name, axes) in enumerate(zip(names, picture.axes, strict=True)):
+        markers = ("o", "white"), ("s", _COLOURS[row % len(_COLOURS)])
         for column, (stimulus, pairs) in enumerate(rows):
-            first, second = pairs[row]
-            if first is not None and second is not None:
-                axes.plot([column, column], [first, second], color=GREY, linewidth=1.0)
-            for value, filled, session in ((first, False, sessions[0]), (second, True, sessions[1])):
+            if len(ends := [value for value in pairs[row] if value is not None]) == len(sessions):
+                axes.plot([column, column], ends, color=GREY, linewidth=1.0)
+            for value, session, (marker, face) in zip(pairs[row], sessions, markers, strict=True):
                 if value is not None:
-                    face = _COLOURS[row % len(_COLOURS)] if filled else "white"
                     note = picture.note(f"{stimulus}, {session}: {name} {value:.4g}")
-                    axes.plot([column], [value], "s" if filled else "o", ms=5.0, mfc=face, mec=INK, mew=0.7, gid=note)
+                    axes.plot([column], [value], marker, ms=5.0, mfc=face, mec=INK, mew=0.7, gid=note)
         axes.set_ylabel(name)
         axes.tick_params(labelbottom=axes is picture.axes[-1])
     picture.axes[0].set_title(f"circle: {sessions[0]}; filled square: {sessions[1]}")
