@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QComboBox, QCompleter, QFileDialog, QRadioButton, 
 from daq_app.qt.cards import CardFrame, CutShort, ScreenFields, TransducerRow
 from daq_app.qt.parts import Panel, button, choice, entry, field, hbox, label, scroll_area, set_horizontal, tick, vbox
 from daq_app.qt.tokens import GRID, TARGET, px
-from daq_app.window.checklist import CARD_FIELDS, Card, checklist, codes_in, next_code, studies_in
+from daq_app.window.checklist import CARD_FIELDS, Card, checklist, codes_in, first_missing, next_code, studies_in
 from daq_app.window.new_session import Bench, SessionForm, enrol_subject, enrolment, optional_phases
 from daq_app.window.state import LanguageChosen, Message
 from daq_app.wording import tr, tr_noop
@@ -152,7 +152,7 @@ class NewSessionPage(Panel):
         return self._cards
 
     def go_to_missing(self) -> None:
-        """Let typing go to the first field that is wrong, and mark its card."""
+        """Mark what is missing, bring the card of the headline into sight, and let typing go to the first field."""
         fields: dict[str, QWidget] = {**self._lines, "protocol": self.protocol}
         gaps = [card for card in self._cards if not card.ready]
         for card in gaps:
@@ -160,6 +160,8 @@ class NewSessionPage(Panel):
         first = next((fields[card.field] for card in gaps if card.field in fields), None)
         if first is not None:
             first.setFocus()
+        if (card := first_missing(self._cards)) is not None:
+            self._scroll.ensureWidgetVisible(self.frames[card.name].message)
 
     def look_for_unfinished_sessions(self) -> None:
         self.cut_short.look_in(self.form().root_folder)
@@ -262,7 +264,8 @@ class NewSessionPage(Panel):
         self._columns = vbox((left, 1), (right, 1))
         inside = QWidget()
         vbox(label(tr("New session"), "title"), self.cut_short, self._columns, 1, on=inside, margins=GRID, spacing=GRID)
-        vbox(scroll_area(inside), on=self, margins=2)
+        self._scroll = scroll_area(inside)
+        vbox(self._scroll, on=self, margins=2)
         self.setMinimumWidth(px(280, most=1.25))
 
     def resizeEvent(self, event: QResizeEvent) -> None:

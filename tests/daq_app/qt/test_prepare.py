@@ -138,6 +138,25 @@ def test_start_lights_when_every_card_is_ready_and_a_card_that_is_mended_says_so
     assert window.to_do.primary.isEnabled()
 
 
+def test_start_brings_the_card_that_its_headline_names_into_sight(driver):
+    window, page = driver.window, driver.window.page
+    size = window.size()
+    window.resize(1366, 640)
+    page.subject.setText("P07")
+    page.folder.setText(__file__)
+    driver.application.processEvents()
+    message = page.frames["Disk"].message
+    try:
+        assert message.visibleRegion().isEmpty()
+        window.act("primary")
+        driver.application.processEvents()
+        assert message.visibleRegion().boundingRect().height() == message.height()
+    finally:
+        page.folder.setText("recordings")
+        page.subject.clear()
+        window.resize(size)
+
+
 def test_a_search_that_finds_nothing_says_so_and_what_to_do(driver):
     bridge, bench = driver.window.bridge, driver.window.bench
     bridge.send(Searching())
