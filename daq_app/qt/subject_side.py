@@ -50,15 +50,18 @@ class TabletScreen(QObject):
 
     @property
     def status(self) -> str:
+        url = self.server.url
+        if not self.server.code_is_used:
+            return tr("Open {url} on the tablet, and type the code {code}.", url=url, code=self.server.code)
         if not self.server.connected:
-            return tr("Open {url} on the tablet, and type the code {code}.", url=self.server.url, code=self.server.code)
+            return tr("The tablet is gone. Open {url} on it again; “New code” lets in another.", url=url)
         state = tr("checked") if self._pixels else tr("not checked")
         line = tr("Line of {length:.0f} mm, {checked} with a ruler.", length=LENGTH, checked=state)
         return f"{tr('The tablet shows the page.')} {line}"
 
     def picture(self) -> bytes:
-        """Return the address with the code as a QR code, PNG; nothing while the tablet is there."""
-        if self.server.connected:
+        """Return the address with the code as a QR code, PNG; nothing once the code is used."""
+        if self.server.code_is_used:
             return b""
         import segno  # an optional package, which the server has looked for
 

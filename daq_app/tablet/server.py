@@ -88,6 +88,11 @@ class TabletServer:
         return self._tablet is not None
 
     @property
+    def code_is_used(self) -> bool:
+        """Say whether a tablet was let in by the code, which lets in no other."""
+        return bool(self._token)
+
+    @property
     def link(self) -> str:
         """Return the address that holds the code too, behind a # that no browser sends."""
         return f"{self.url}/#{self.code}"

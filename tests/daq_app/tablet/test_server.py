@@ -90,6 +90,26 @@ def test_one_device_is_let_in_by_the_code_and_comes_back_by_its_token(server):
     assert server.requests[0].pixels_per_mm == 4.0
 
 
+@pytest.mark.qt
+def test_a_tablet_that_is_gone_is_asked_to_come_back_and_a_used_code_is_not_shown():
+    from daq_app.qt.subject_side import TabletScreen
+
+    screen = TabletScreen("127.0.0.1", 0)
+    server = screen.server
+    try:
+        assert server.code in screen.status
+        with socket(server, code=server.code) as talk:
+            receive(talk)
+        until(lambda: not server.connected)
+        assert server.code not in screen.status
+        assert "on it again" in screen.status
+        assert screen.picture() == b""
+        server.renew()
+        assert server.code in screen.status
+    finally:
+        server.close()
+
+
 def test_a_tab_whose_place_another_takes_is_told_so_and_need_not_take_it_back(server):
     with socket(server, code=server.code) as first:
         token = receive(first)["token"]
