@@ -128,6 +128,10 @@ class SubjectSide(QObject):
         subject.answered.connect(self._let_go)
         subject.ruler.finished.connect(lambda: subject.scoring or self.come_back())
         subject.screen_changed.connect(self.line_changed)
+        application = QGuiApplication.instance()
+        assert isinstance(application, QGuiApplication)
+        for screens_changed in (application.screenAdded, application.screenRemoved):
+            screens_changed.connect(self._follow_screens, Qt.ConnectionType.QueuedConnection)  # once windows have moved
         if tablet is not None:
             tablet.answered.connect(bridge.send)
             tablet.changed.connect(self.line_changed)
@@ -174,11 +178,20 @@ class SubjectSide(QObject):
         return line_settings(millimetres(screen)) if tablet is None else tablet.line_settings()
 
     def come_back(self) -> None:
-        """Let the keyboard come back to the experimenter's window, which is in front where it shares a screen."""
-        if len(QGuiApplication.screens()) == 1:
-            self._subject.hide()
-            self._window.raise_()
+        """Let the keyboard come back to the experimenter's window, which has its screen to itself."""
+        self._clear_screen()
         self._window.activateWindow()
+
+    def _follow_screens(self) -> None:
+        if not self._subject.scoring and not self._subject.measuring:
+            self._clear_screen()
+
+    def _clear_screen(self) -> None:
+        """Take the page from the experimenter's screen to a second one, where there is one."""
+        if self._subject.screen() is self._window.screen():
+            self._subject.hide()
+            self.begin()
+            self._window.raise_()
 
     def _show_subject(self, *, activating: bool) -> None:
         subject, own_screen = self._subject, self._window.screen()

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
@@ -49,6 +50,16 @@ def test_an_answer_can_be_given_with_keys_that_reach_the_experimenters_window(dr
     assert window.subject.line.answer.score == 60.0
     driver.answer(on=window)
     assert driver.session.trials[0].answer == "score 60"
+
+
+def test_the_page_leaves_the_experimenters_screen_with_the_answer_also_where_there_is_another(driver, monkeypatch):
+    driver.begin()
+    driver.go_on("scoring")
+    subject, own = driver.window.subject, driver.window.screen()
+    monkeypatch.setattr(QGuiApplication, "screens", lambda: [own, own])
+    assert subject.isVisible()
+    driver.answer(Qt.Key.Key_Right)
+    assert not subject.isVisible()
 
 
 def test_no_key_answers_on_a_page_that_was_closed_and_its_mark_waits(driver):

@@ -23,15 +23,22 @@ DESK, TABLET = 1400, 1000  # widths of the experimenter's and the subject's scre
 WINDOW, SUBJECT = "daq-app", "daq-app · subject"
 
 
+def xrandr(desk, *words):
+    subprocess.run(["xrandr", *words], env=desk.environment, check=True, capture_output=True)
+
+
+def plug_in(desk, number, width, offset):
+    monitor = f"{width}/{width // 4}x{HEIGHT}/{HEIGHT // 4}+{offset}+0"
+    xrandr(desk, "--setmonitor", f"screen{number}", monitor, "none" if number else "screen")
+
+
 @contextmanager
 def desk_of(screens):
     with server(sum(screens), HEIGHT) as display:
         desk = Desk(display)
         offset = 0
         for at, width in enumerate(screens):
-            monitor = f"{width}/{width // 4}x{HEIGHT}/{HEIGHT // 4}+{offset}+0"
-            command = ["xrandr", "--setmonitor", f"screen{at}", monitor, "none" if at else "screen"]
-            subprocess.run(command, env=desk.environment, check=True, capture_output=True)
+            plug_in(desk, at, width, offset)
             offset += width
         manager = subprocess.Popen(["openbox", "--sm-disable"], env=desk.environment, stderr=subprocess.DEVNULL)
         try:
@@ -165,3 +172,19 @@ def test_no_key_typed_into_another_program_answers_and_the_subjects_window_comes
             other.terminate()
             text, _ = other.communicate()
         assert text.split() == ["1", "12"]
+
+
+def test_the_page_leaves_with_the_second_screen_and_comes_back_with_it(tmp_path):
+    with desk_of((DESK, TABLET)) as desk, desk.program(tmp_path):
+        begin(desk, tmp_path / "recordings")
+
+        def is_there():
+            return desk.box(desk.window("subject$"))[0] >= DESK
+
+        until(is_there, "the page on the second screen")
+        xrandr(desk, "--delmonitor", "screen1")
+        until(lambda: not desk.do("search", "--onlyvisible", "--name", "subject$"), "a screen without the page")
+        assert desk.active() == WINDOW
+        plug_in(desk, 1, TABLET, DESK)
+        until(is_there, "the page on the second screen again")
+        assert desk.active() == WINDOW
