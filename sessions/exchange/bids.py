@@ -12,7 +12,7 @@ import re
 from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from itertools import groupby, pairwise
+from itertools import groupby, pairwise, repeat
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, TextIO
@@ -222,13 +222,11 @@ def _rows_with_gaps(
 ) -> Iterator[tuple[Any, ...]]:
     """Yield the rows, and a row of n/a for each reading that never arrived; NaN and infinity are written as n/a too."""
     finite = bool(np.isfinite(block.raw).all())
-    next_number = None if last_number is None else last_number + 1
+    missing = (NOT_AVAILABLE,) * (width - len(mark)) + mark
     for row in cells:
-        if next_number is not None:
-            for _ in range(row[0] - next_number):
-                yield (NOT_AVAILABLE,) * (width - len(mark)) + mark
+        yield from repeat(missing, 0 if last_number is None else row[0] - last_number - 1)
         yield (row if finite else tuple(cell if math.isfinite(cell) else NOT_AVAILABLE for cell in row)) + mark
-        next_number = row[0] + 1
+        last_number = row[0]
 
 
 @contextmanager

@@ -350,15 +350,14 @@ def _drag_runs(wrench: Array, time: Array, unsure: float, settings: AnalysisSett
         return []
     least_drag = rule.turn_share * float(np.median(drag / load)) * load
     strong = np.flatnonzero((drag >= least_drag) & (drag > rule.turn_unsure * unsure))
-    lasts = pressed[np.append(firsts[1:], len(pressed)) - 1]
     runs: list[list[int]] = []  # of blocks
     for block in strong.tolist():
         if runs and float(force[:, runs[-1][-rule.turn_recent :]].sum(axis=1) @ force[:, block]) >= 0.0:
             runs[-1].append(block)
         else:
             runs.append([block])
-    bounds = [(int(pressed[firsts[run[0]]]), int(lasts[run[-1]])) for run in runs]
-    every_run = [_DragRun(*pair, force[:, run].sum(axis=1), len(run)) for pair, run in zip(bounds, runs, strict=True)]
+    begins, ends = pressed[firsts].tolist(), pressed[np.append(firsts[1:], len(pressed)) - 1].tolist()
+    every_run = [_DragRun(begins[run[0]], ends[run[-1]], force[:, run].sum(axis=1), len(run)) for run in runs]
     greatest = max((run.drag for run in every_run), default=0.0)
     longest = max((float(time[run.last] - time[run.first]) for run in every_run), default=0.0)
     shortest = max(rule.shortest_stroke - rule.turn_block, rule.turn_shortest * longest)

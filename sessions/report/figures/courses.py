@@ -150,8 +150,8 @@ def _draw(picture: Sheet, quantity: StrokeQuantity, curves: Sequence[tuple[Strok
             labels.append(Label(str(stroke.number if stroke.index is None else stroke.index), *point))
     axes.set(xlabel="time since contact onset [s]", xlim=(0.0, max((t for _, _, t, _, _ in rows), default=1.0)))
     if rows:  # from 0 on where nothing lies below
-        greatest = [v for _, _, _, v, _ in rows]
-        low, high = min(*greatest, 0.0), max(greatest)
+        heights = [row[3] for row in rows]
+        low, high = min(0.0, *heights), max(heights)
         axes.set_ylim(low - (0.03 * (high - low) if low < 0 else 0.0), high + 0.06 * (high - low))
     if len(labels) <= MOST_LABELLED:
         label_right(picture, axes, labels, "index" if in_order and in_order[0][0].index is not None else "stroke")
