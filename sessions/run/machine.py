@@ -204,7 +204,9 @@ def _redo_undone(state: State) -> Step:
         case Mounting(position) | Taring(position) | Ready(position) if position.before_redo is not None:
             previous = position.before_redo
         case _:
-            return state, (steps.Refuse("there is no redo to undo: it can be undone until the next stroke"),)
+            return state, (
+                steps.Refuse("there is no redo to undo: that of a whole stroke can be undone until the next one"),
+            )
     assert not isinstance(previous, Ended)
     restored, trials, restores = previous.position, position.plan.trials, list[steps.Command]()
     in_hand = restored.index if isinstance(previous, Scoring | Settling) else None

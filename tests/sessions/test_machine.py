@@ -212,7 +212,7 @@ def test_a_redo_is_undone_until_the_next_stroke_and_the_answer_is_asked_for_agai
         StartTake(1, 3),
     )
     (refusal,) = advance(after(FORCES, *so_far, Zeroed(), *STROKE)[0], UndoRedo())[1]
-    assert refusal == Refuse("there is no redo to undo: it can be undone until the next stroke")
+    assert refusal == Refuse("there is no redo to undo: that of a whole stroke can be undone until the next one")
 
 
 def test_undoing_the_redo_of_a_trial_that_was_done_restores_it_and_of_one_that_was_skipped_leaves_it_out():
