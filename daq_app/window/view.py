@@ -125,7 +125,7 @@ def bench_view(bench: BenchState, *, recording: bool, unheard: float = 0.0) -> B
         searching=bench.searching,
         search_text=_search_text(bench),
         uri=bench.uri,
-        connect=m.Disconnect() if open_now and not recording else None,
+        connect=m.Disconnect() if bench.link in ("open", "lost") and not recording else None,
         can_tare=open_now and not recording and not bench.taring,
         can_acknowledge=bool(bench.peak.overloads or bench.saturated),
     )

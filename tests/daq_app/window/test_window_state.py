@@ -221,6 +221,13 @@ def test_a_banner_of_a_lost_link_goes_when_the_same_transducer_is_back_and_stays
     assert "FT2" in derive_view(after(m.LinkBack(other, False), state=link_down)).banner.sentence
 
 
+def test_a_transducer_that_was_lost_can_be_disconnected_for_another_once_no_session_runs():
+    assert derive_view(after(*MOUNT, m.LinkDown("silent"))).bench.connect is None
+    link_down = after(m.Device(INFO, None), m.LinkDown("silent"))
+    assert derive_view(link_down).bench.connect == m.Disconnect()
+    assert derive_view(after(m.NoDevice(), state=link_down)).bench.connect is None
+
+
 def test_an_error_while_saving_ends_the_course_and_puts_the_lamp_to_wrong():
     view = derive_view(after(*MOUNT, m.Failed("StartSession", "the disk is full", "RecordingError")))
     assert view.lamp.grade == "wrong"
