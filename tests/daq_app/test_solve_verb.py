@@ -84,6 +84,17 @@ def test_solve_stopped_by_the_user_gives_the_answer_that_was_there_already(tmp_p
     assert any("Stopped" in warning for warning in document["warnings"])
 
 
+def test_a_number_that_is_nothing_but_round_off_is_printed_as_such(tmp_path, capsys):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        "[friction]\nmu = 0.5\n[loading]\nnormal_force = 0.1\ntangential_force = 0.03\n[materials.fat]\nE = 0.034\n"
+        'nu = 0.48\nprony = [{ g = 0.2, tau = 0.07 }]\n[solve]\ncourse = "history"\n'
+    )
+    assert run(["solve", str(scene)]) == 0
+    output = capsys.readouterr().out
+    assert "0.00000000" not in output  # no drag at the end of the press
+
+
 def test_solve_with_a_history_prints_its_course(tmp_path, capsys):
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE + '[solve]\ncourse = "history"\n')

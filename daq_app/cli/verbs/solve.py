@@ -189,7 +189,7 @@ def _plain(table: "Array") -> list[list[float | None]]:
 
 def _with_error(value: float, error: float, factor: float) -> str:
     """Return a number times `factor` with two digits of its error, or with four where that is round-off or unknown."""
-    if not _EXACT * abs(value) < error < inf:
+    if not _EXACT * max(abs(value), 1.0 / factor) < error < inf:
         return f"{number(value, 4, factor=factor)} ± {number(error, 2, factor=factor)}" if isfinite(value) else "–"
     decimals = max(0, 1 - floor(log10(factor * error)))
     return f"{quantity(factor * value, decimals)} ± {quantity(factor * error, decimals)}"
