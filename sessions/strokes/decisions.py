@@ -61,7 +61,7 @@ OF_TRIAL: Mapping[str, Kind] = {"choice": Kind(_Count, "the number of the stroke
 OF_SESSION: Mapping[str, Kind] = {
     "tilt": Kind(
         tuple[_Angle, _Angle],
-        "two angles [degrees]: how far the face's normal leans to +x and to +y, which is levelled",
+        f"two angles of at most {MOST_TILT:g}°: how far the face's normal leans to +x and to +y, which is levelled",
         "degrees",
     )
 }

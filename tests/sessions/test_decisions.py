@@ -113,7 +113,7 @@ def test_every_line_of_a_simulated_session_says_so(recording):
         ({"what": "kept", "new": 1}, "cannot be"),
         ({"what": "choice", "stroke": None, "new": 0}, "cannot be"),
         ({"trial": None, "stroke": None}, "give one of tilt"),
-        ({"what": "tilt", "trial": None, "stroke": None, "new": (30.0, 0.0)}, "two angles"),
+        ({"what": "tilt", "trial": None, "stroke": None, "new": (30.0, 0.0)}, "two angles of at most 20°"),
         ({"undoes": 1}, "nothing to undo"),
     ],
 )
