@@ -23,6 +23,7 @@ class CondensedBody(Protocol):
 
     constant: bool  # whether all states share one stiffness, so that one linear solve is exact
     bulk: float  # largest ratio of first Lamé constant to shear modulus [-]
+    length_scale: float  # by which displacements count as small or large [mm]
     held: Narrow  # (k,) directions in which a node is held: 0, HELD_X, HELD_Y or their sum
     middle: Narrow  # (k,) 1 at the middle of an edge whose length follows the deformed skin, else 0
     fixed_length: Array  # (k,) tributary length of each node, where the deformation does not change it [mm]
@@ -104,6 +105,7 @@ class CondensedLinear:
         `stiffness` (2 k, 2 k) and the condensed dead `load` (2 k,) list x, y of one node after the other.
         """
         self.constant, self.bulk = True, 0.0
+        self.length_scale = float(np.ptp(rest, axis=0).max()) if len(rest) else 0.0
         self.rest, self.stiffness, self.load = rest, stiffness, load
         self.fixed_length, self.held, self.middle = length, held, np.zeros(len(rest), np.int32)
         self.motions = np.zeros((2 * len(rest), 0))  # rigid motions that the surface alone balances

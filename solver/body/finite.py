@@ -165,7 +165,7 @@ class CondensedFinite:
     def __init__(self, body: FiniteBody, *, relaxes: bool = False) -> None:
         """Allocate memory for `body`, and for the overstress of tissues where it `relaxes`."""
         count = len(body.elements.nodes)
-        self.body, self.constant = body, False
+        self.body, self.constant, self.length_scale = body, False, body.mesh.length_scale
         self.load = np.zeros(body.size)  # dead loads by unknowns
         self.all_forces = np.zeros(body.size)  # internal forces of all unknowns, less the dead loads
         self.inside = Elimination(body.plan)

@@ -35,10 +35,11 @@ LARGEST_MU = 2.0  # largest coefficient of friction to which a branch is followe
 class BranchControl:
     """Control of the continuation and of its end; steps are fractions of the largest range.
 
-    A tolerance of 1e-6 mm changed no limit of eleven slides by more than 0.013 %, steps a quarter as long by 0.17 %.
+    A hundredth of the tolerance changed no limit of eleven slides by more than 0.013 %, steps a quarter as long by
+    0.17 %, half of the unit or double by 0.7 %.
     """
 
-    tolerance: float = 1e-4  # of a point on the branch [mm]
+    tolerance: float = 1e-5  # of a point on the branch, by the length scale of the body
     first: float = 0.1  # first step along the branch
     shortest: float = 1e-3  # shortest step
     growth: float = 1.5  # ratio of the next step to one with few iterations
@@ -54,6 +55,7 @@ class BranchControl:
     force_change: float = 0.05  # largest relative change of the forces in such a step
     apart: float = 0.04  # largest difference of least stretches at consecutive points
     aim: float = 0.5  # part of that difference at which a step aims
+    unit: float = 0.1  # displacement, by the length scale of the body, that counts as much as a friction of 1
 
 
 BRANCH = BranchControl()
@@ -99,7 +101,7 @@ class _Point(NamedTuple):
 class _Tangent(NamedTuple):
     """A unit tangent of a branch."""
 
-    direction: Array  # (2 k,) unknowns of the skin over root n [mm]
+    direction: Array  # (2 k,) unknowns of the skin, by `Continuation.unit`
     rate: float  # of the parameter
 
 
@@ -214,6 +216,13 @@ class Continuation:
                     return Branch((*branch.states[:after], state), target, limited=False)
         return Branch(branch.states[:after], values[after - 1], limited=True, lost=True)
 
+    @property
+    def unit(self) -> float:
+        """Displacement of one unknown that counts as much as a unit of the parameter, a friction or a mm [mm]."""
+        newton = self.body.newton
+        whole = BRANCH.unit * newton.condensed.length_scale if self.parameter == BY_FRICTION else 1.0
+        return whole * float(np.sqrt(len(newton.steps)))
+
     def _point(self, state: EquilibriumState) -> _Point:
         return _Point(state, self.body.skin_compression(state), self._value(state.load))
 
@@ -237,32 +246,31 @@ class Continuation:
     def _tangent(self, state: EquilibriumState) -> _Tangent:
         newton = self.body.newton
         newton.linearise(state, state.load, newton.skin_x)
-        direction = newton.steps[:, self.parameter] / np.sqrt(len(newton.steps))
-        size = np.sqrt(direction @ direction + 1.0)
+        direction = newton.steps[:, self.parameter] / self.unit
+        size = float(np.sqrt(direction @ direction + 1.0))
         return _Tangent(direction / size, 1.0 / size)
 
     def _next(self, start: _Point, tangent: _Tangent, length: float) -> EquilibriumState | None:
         """Return the state a step of `length` along the branch; None where the corrector fails."""
-        newton, (direction, rate) = self.body.newton, tangent
-        root = np.sqrt(len(newton.steps))
+        newton, (direction, rate), unit = self.body.newton, tangent, self.unit
         state, load = start.state, start.state.load
         total = np.zeros(len(newton.steps))
         for _ in range(BRANCH.corrections):
             if not newton.linearise(state, load, newton.skin_x):
                 return None
-            to, along = newton.steps[:, EQUILIBRIUM] / root, newton.steps[:, self.parameter] / root
+            to, along = newton.steps[:, EQUILIBRIUM] / unit, newton.steps[:, self.parameter] / unit
             current = self._value(load)
-            ahead = direction @ along + rate
+            ahead = float(direction @ along) + rate
             if ahead == 0.0:
                 return None
-            change = (length - direction @ (total + to) - rate * (current - start.value)) / ahead
+            change = (length - float(direction @ (total + to)) - rate * (current - start.value)) / ahead
             step = to + change * along
             load = self._with_value(load, current + change)
-            state, largest, changes = newton.apply_step(state, load, step * root, newton.skin_x)
+            state, largest, changes = newton.apply_step(state, load, step * unit, newton.skin_x)
             total = total + step
-            if not largest < 10.0:
+            if not largest < newton.condensed.length_scale:
                 return None
-            if largest < BRANCH.tolerance and not changes:
+            if largest < BRANCH.tolerance * newton.condensed.length_scale and not changes:
                 moved = self._value(load) - start.value
                 distance = np.sqrt(total @ total + moved**2)
                 return state if direction @ total + rate * moved > BRANCH.turn * distance else None

@@ -11,7 +11,7 @@ from solver._kernels.contact_system import STEEP
 from solver.contact import LoadState
 from solver.continuation import Continuation
 from solver.continuation.limit_point import LIMIT, Reach, is_folded, of_depth, of_friction, sound
-from solver.equilibrium import EquilibriumState, Newton
+from solver.equilibrium import TO_ROUND_OFF, EquilibriumState, Newton
 from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_stepping import solve_full_slip
 from solver.failures import NoSteadyState, NotConverged
@@ -23,7 +23,10 @@ BEYOND_LIMIT = 0.06  # relative distance beyond a limit at which another path is
 
 
 def steady(
-    finger: FiniteFinger, load: LoadState, tolerance: float = 1e-10, start: EquilibriumState | None = None
+    finger: FiniteFinger,
+    load: LoadState,
+    tolerance: float = TO_ROUND_OFF.tolerance,
+    start: EquilibriumState | None = None,
 ) -> EquilibriumState:
     """Return the settled slide under `load` that lies on the branch from the frictionless state or a shallow press.
 

@@ -28,7 +28,7 @@ from solver.scene import Scene
 class ForceSearch:
     """Control of the search for a nearby state, and for the depth at which the normal force is the given one."""
 
-    leading: float = 1e-3  # tolerance of intermediate states [mm]
+    leading: float = 1e-4  # tolerance of intermediate states, by the length scale of the body
     beyond: float = 1.5  # ratio of the largest depth searched to the one from which the force did not grow
     tolerance: float = 1e-9  # relative tolerance of the normal force
     searches: int = 20  # steps of the search for the depth, at most

@@ -31,7 +31,7 @@ class LimitControl:
     smooth: float = 0.66  # stretch above which states of the coarse mesh agree with those of the fine one
     sound: float = 0.65  # stretch of a state from which others may start: neo-Hookean surfaces fold at 0.54
     plain: float = 0.71  # stretch above which a state needs no proof: meshes just below a limit have up to 0.70
-    astray: float = 0.5  # distance of the fold from its expected place for which the mesh is made anew [mm]
+    astray: float = 0.1  # distance of the fold from its expected place, by the tip radius, for another mesh
     starts: tuple[float, ...] = (0.3, 0.1, 0.03, 0.01)  # fractions of the depth at which its branch may begin
     nearly: float = 0.02  # stretch above the folding one that counts as near a limit: some 2 % of the friction
 
@@ -208,7 +208,7 @@ def _reach(search: BranchSearch) -> Reach:
     branch = search.stop(finger, coarse)
     if branch.limited or not sound(finger, branch.last, LIMIT.plain):
         finger, branch, place = search.trace_on_fine_mesh(finger, branch.states)
-        if abs(_place_of_least_stretch(finger, branch.last) - place) > LIMIT.astray:
+        if abs(_place_of_least_stretch(finger, branch.last) - place) > LIMIT.astray * search.scene.finger.tip_radius:
             finger, branch, _ = search.trace_on_fine_mesh(finger, branch.states)
     least = finger.skin_compression(branch.last).least
     numbers = finger.numbers([branch.last])[0]

@@ -35,24 +35,24 @@ EQUILIBRIUM, BY_DEPTH, BY_FRICTION, BY_TRAVEL = 0, 1, 2, 3  # columns of Newton.
 
 @dataclass(frozen=True, slots=True)
 class NewtonControl:
-    """When the iterations halve a step, keep a tangent or stop.
+    """When the iterations halve a step, keep a tangent or stop; lengths are by the length scale of the body.
 
     Halving or doubling any of these changed no state of eighteen slides, presses and load paths at finite strain by
     more than 6e-10, and the number of tangents by 3 % at most. Without keeping tangents there are 5 % more.
     """
 
     shortest: float = 1.0 / 16.0  # smallest part of a step that is tried where the whole turns the body inside out
-    stride: float = 0.3  # largest change of depth or travel in one iteration where forces are given [mm]
+    stride: float = 0.02  # largest change of depth or travel in one iteration where forces are given
     rounds: int = 12  # changes of contact states within one linearisation: its systems are small, and so cheap
-    near: float = 0.1  # first step below which the tangent of the state before is kept [mm]
+    near: float = 0.01  # first step below which the tangent of the state before is kept
     fast: float = 0.02  # ratio of consecutive steps below which a new tangent is kept
     slow: float = 0.5  # the same ratio, above which a kept tangent is renewed
-    turn: float = 0.01  # step times bulk over shear stiffness, above which no tangent is kept [mm]
+    turn: float = 1e-3  # step times bulk over shear stiffness, above which no tangent is kept
     patience: int = 20  # most systems for the contact states of a linear body, beside four for each node
     margin: float = 0.5  # part of the tolerance that the remaining step, as estimated, may take
     same: float = 1e-3  # relative difference below which two steps count as equal
     repeats: int = 4  # equal steps in a row that count as a cycle
-    unbounded: float = 1e3  # displacement from which the body counts as loose [mm]
+    unbounded: float = 100.0  # displacement from which the body counts as loose
 
 
 CONTROL = NewtonControl()
@@ -61,7 +61,7 @@ CONTROL = NewtonControl()
 class Termination(NamedTuple):
     """When the iterations for an equilibrium end: at the larger of two errors, or with a failure at the limit."""
 
-    tolerance: float = 1e-10  # of displacements [mm]
+    tolerance: float = 1e-11  # of displacements, by the length scale of the body [-]
     part: float = 0.0  # of displacements, by the largest of the first step [-]
     limit: int = 25  # iterations, at most
 
@@ -183,6 +183,7 @@ class Newton:
         """Solve the contact of the linearised body at `state`; return the result of `solve_active_set`."""
         body = self.condensed
         self._states.state[:], self._states.sense[:] = state.state, state.sense
+        stride = np.inf if body.constant else CONTROL.stride * body.length_scale
         kind, drag, push = DEPTH_CONTROL, 0.0, 0.0
         if forces is not None:
             kind = PUSH_CONTROL if forces.tangential is None else DRAG_CONTROL
@@ -190,7 +191,7 @@ class Newton:
         return self._active_set(
             self.arrays(), body.compliance, self.skin, self._states, load_arguments(load),
             self._position(state.u, load, anchor),
-            ContactControl(kind, float(drag), float(push), np.inf if body.constant else CONTROL.stride, rounds),
+            ContactControl(kind, float(drag), float(push), stride, rounds),
         )  # fmt: skip
 
     def arrays(self) -> CondensedArrays:
@@ -272,6 +273,7 @@ class Newton:
         """Return the equilibrium that iterations from `begin` end in. Raises NotConverged."""
         state = previous = begin
         reuse = self.condensed.equilibrium is begin.u
+        size = self.condensed.length_scale
         scale, first, last, new, equal_steps = 1.0, 0.0, 0.0, False, 0
         for _ in range(termination.limit):
             if reuse:
@@ -287,7 +289,7 @@ class Newton:
             elif state is not previous:
                 previous, scale = state, min(1.0, 2.0 * scale)
             state, largest, changes = self.correct(previous, anchor, scale)
-            if not largest < CONTROL.unbounded:
+            if not largest < CONTROL.unbounded * size:
                 raise NotConverged("the displacements grow without bound")
             first = first or largest
             fall = min(largest / last, 1.0) if last > 0.0 else 1.0
@@ -295,14 +297,15 @@ class Newton:
             if equal_steps == CONTROL.repeats:
                 raise NotConverged("states of contact come again and again")
             remainder = min((2.0 * fall) ** 2 if not reuse else 4.0 * fall if new else 2.0 * fall, 1.0)
-            accuracy = max(termination.tolerance, termination.part * first)
+            accuracy = max(termination.tolerance * size, termination.part * first)
             if largest * remainder < CONTROL.margin * accuracy and not changes and scale == 1.0:
                 self.condensed.equilibrium = state.u
                 return state
             new = not reuse
-            still = largest < CONTROL.near if last == 0.0 else fall < CONTROL.slow
+            still = largest < CONTROL.near * size if last == 0.0 else fall < CONTROL.slow
             # A kept tangent has turned by then. Its step changes volume to second order, which a stiff body resists.
-            reuse = (still if reuse else fall < CONTROL.fast and scale == 1.0) and self.bulk * largest < CONTROL.turn
+            may_turn = self.bulk * largest < CONTROL.turn * size
+            reuse = (still if reuse else fall < CONTROL.fast and scale == 1.0) and may_turn
             last = largest
         raise NotConverged(f"no equilibrium within {termination.limit} iterations")
 

@@ -36,7 +36,7 @@ Report = Callable[[str, float], None]  # called with a text and the fraction of 
 
 @dataclass(frozen=True, slots=True)
 class CourseSteps:
-    """The load steps of a path; lengths of a slide are relative to the indentation."""
+    """The load steps of a path; lengths are relative to the indentation."""
 
     press: int  # number of steps of the press, and of a drag
     first: float  # first step of a slide
@@ -44,8 +44,7 @@ class CourseSteps:
     largest: float  # largest step of a slide
     furthest: float  # slide after which a state that still changes is refused
     plateau: int = 0  # steps beyond the settled state, which show that it stays
-    tolerance: float = 1e-10  # of displacements [mm]
-    by_depth: float = 1.0  # of displacements by the indentation, where that is smaller
+    tolerance: float = 0.0  # of displacements; a body of constant stiffness needs none
 
     def finer(self, times: float) -> "CourseSteps":
         """Return `times` as many steps."""
@@ -54,8 +53,8 @@ class CourseSteps:
 
 
 SMALL_STEPS = CourseSteps(25, first=0.01, growth=1.2, largest=0.06, furthest=100.0, plateau=4)
-_FINITE = CourseSteps(40, first=0.1, growth=1.0, largest=0.1, furthest=8.0, tolerance=1e-7, by_depth=1e-7)
-RELAXING = CourseSteps(25, first=0.02, growth=1.2, largest=0.1, furthest=25.0, tolerance=1e-8, by_depth=1e-7)
+_FINITE = CourseSteps(40, first=0.1, growth=1.0, largest=0.1, furthest=8.0, tolerance=1e-7)
+RELAXING = CourseSteps(25, first=0.02, growth=1.2, largest=0.1, furthest=25.0, tolerance=1e-8)
 LONG = 25.0  # slide by the indentation within which states settle, except near the wedging limit
 
 
@@ -110,17 +109,18 @@ class LoadPath:
         newton: Newton,
         friction: LoadState,
         loading: Loading,
-        tolerance: float = SMALL_STEPS.tolerance,
+        tolerance: float = 0.0,
         tissue: Tissue | None = None,
     ) -> None:
         """Start undeformed, with mu and bound of `friction`; `loading` prescribes depth or forces.
 
-        `tolerance` [mm] is that of displacements where depth and travel are given. `tissue` is one that relaxes.
+        `tolerance` is that of displacements by the indentation, where that is given. `tissue` is one that relaxes.
         """
         self.tissue = tissue
         self.energies: list[Array] = []  # of its endings, at every instant after the first [MPa]
         self.sense = 0  # direction of the friction force on relaxing skin; 0: unknown
-        self.newton, self._tolerance = newton, tolerance
+        self.newton = newton
+        self._termination = Termination(tolerance * (loading.indentation or 0.0) / newton.condensed.length_scale)
         self.frictionless = friction.frictionless
         self.by_force = loading.normal_force is not None
         # a drag needs friction
@@ -159,7 +159,7 @@ class LoadPath:
             state = solve_under_forces(self.newton, lower_onto_surface(self.newton.condensed, previous), forces)
         else:
             load = previous.load._replace(depth=aim.press, travel=-aim.along)
-            state = self.newton.settle(previous, load, Termination(self._tolerance))
+            state = self.newton.settle(previous, load, self._termination)
         if self.tissue is not None:
             self.energies.append(self.tissue.commit(state, step))
         return state
@@ -222,12 +222,9 @@ def steps_of(finger: Finger[Patches], *, relaxing: bool = False) -> CourseSteps:
 
 def undeformed_path(scene: Scene, finger: Finger[Patches], *, relaxing: bool = False) -> LoadPath:
     """Return the load path of a scene at its beginning, undeformed."""
-    steps, loading = steps_of(finger, relaxing=relaxing), scene.loading_per_mm
-    tolerance = steps.tolerance
-    if loading.normal_force is None:
-        tolerance = min(tolerance, steps.by_depth * loading.depth)
     tissue = tissue_of(scene, finger) if relaxing else None
-    return LoadPath(finger.newton, load_of(scene), loading, tolerance, tissue)
+    tolerance = steps_of(finger, relaxing=relaxing).tolerance
+    return LoadPath(finger.newton, load_of(scene), scene.loading_per_mm, tolerance, tissue)
 
 
 def tissue_of(scene: Scene, finger: Finger[Patches]) -> Tissue:

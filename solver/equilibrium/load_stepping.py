@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.contact import ForceLoad, LoadState
-from solver.equilibrium import EquilibriumState, Newton, Termination, lower_onto_surface
+from solver.equilibrium import TO_ROUND_OFF, EquilibriumState, Newton, Termination, lower_onto_surface
 from solver.failures import ContactLost, NotConverged, at_end_of_path
 from solver.progress import check_stop, report_progress
 from solver.scene import Scene
@@ -87,13 +87,13 @@ def march(
     newton: Newton,
     course: Iterable[LoadState | ForceLoad],
     start: EquilibriumState | None = None,
-    tolerance: float = 1e-7,
+    tolerance: float = 1e-8,
 ) -> Iterator[EquilibriumState]:
     """Yield the equilibrium at each load of `course`, from `start` or the undeformed state, with cut-back.
 
     A load is a load state, or forces under the friction of `start`. Backward Euler: within a step a point sticks where
-    it was, or slips from there. Raises NotConverged, saying where, Cancelled, and ValueError for a load that is not
-    allowed.
+    it was, or slips from there. `tolerance` is that of displacements, by the length scale of the body. Raises
+    NotConverged, saying where, Cancelled, and ValueError for a load that is not allowed.
     """
     state, end = EquilibriumState.undeformed(newton.condensed) if start is None else start, Termination(tolerance)
     for number, aim in enumerate(aims := [aim.validate() for aim in course]):
@@ -114,26 +114,28 @@ def march(
 
 
 State = TypeVar("State")
-FIRST, FURTHEST = 1e-7, 1.0  # first and largest stride of the search for a bracket [mm]
+FIRST, FURTHEST = 1e-8, 0.1  # first and largest stride of the search for a bracket, by the length scale of the body
 SEARCHES = 60  # evaluations within the bracket, at most
 
 
-def find_root(function: Callable[[float], tuple[float, State]], start: float, close: float) -> State | None:
+def find_root(
+    function: Callable[[float], tuple[float, State]], start: float, close: float, size: float = 1.0
+) -> State | None:
     """Return the state at the root of an increasing function, to within `close`; None where there is no bracket.
 
-    `function` returns its value at a place, and the state there. Strides from `start` that double find a bracket,
-    and regula falsi with the Illinois rule the root (Dowell and Jarratt 1971).
+    `function` returns its value at a place, and the state there. Strides from `start` that double find a bracket, up to
+    a part of `size`. Regula falsi with the Illinois rule finds the root (Dowell and Jarratt 1971).
 
     >>> round(find_root(lambda x: (x**3 - 8e-9, x), 0.0, 1e-18), 9)
     0.002
     """
     previous = latest = start
     bracket, state = function(start)
-    beyond, stride = bracket, FIRST if bracket < 0.0 else -FIRST
+    beyond, stride = bracket, FIRST * size if bracket < 0.0 else -FIRST * size
     while beyond * bracket > 0.0:
         previous, bracket = latest, beyond
         latest, stride = latest + stride, 2.0 * stride
-        if abs(stride) > FURTHEST:
+        if abs(stride) > FURTHEST * size:
             return None
         beyond, state = function(latest)
     for _ in range(SEARCHES):
@@ -186,7 +188,8 @@ def _find_travel(
         near = newton.settle_from(near, start, ForceLoad(forces.normal, None, travel), termination)
         return float(near.force[0]) - drag, near
 
-    state_at_drag = find_root(drag_error, state.load.travel, DRAG_TOLERANCE * state.load.mu * forces.normal)
+    close = DRAG_TOLERANCE * state.load.mu * forces.normal
+    state_at_drag = find_root(drag_error, state.load.travel, close, newton.condensed.length_scale)
     if state_at_drag is None:
         raise NotConverged("no travel meets the drag")
     return state_at_drag
@@ -202,7 +205,7 @@ class SlipControl:
     hertz: float = 0.5  # overlap by depth from which skin is guessed to touch: in Hertz' contact half the overlap does
     short: int = 12  # systems for that guess, at most
     parts: tuple[float, ...] = (0.3, 0.6, 0.1, 0.9, 0.03, 0.01)  # of the depth: overlaps that are tried in turn
-    leading: float = 1e-3  # tolerance of steps before the last [mm]; looser ones diverge near nu = 0.5
+    leading: float = 1e-4  # tolerance of steps before the last [-]; looser ones diverge near nu = 0.5
     work: int = 160  # tangents after which no more steps are halved: 80 lose presses deep in the tissue, 320 gain none
     smallest: float = 1.0 / 64.0  # smallest step, as a part of the path
 
@@ -211,12 +214,12 @@ SLIP_CONTROL = SlipControl()
 
 
 def solve_full_slip(
-    newton: Newton, load: LoadState, start: EquilibriumState | None = None, tolerance: float = 1e-10
+    newton: Newton, load: LoadState, start: EquilibriumState | None = None, tolerance: float = TO_ROUND_OFF.tolerance
 ) -> EquilibriumState:
     """Return the settled slide under `load` (sense +1 or -1), in one step from `start` or the undeformed state.
 
-    A step that fails is halved in depth, friction and bound together. Raises NotConverged where that does not help,
-    Cancelled, and ValueError for a load state that is not allowed.
+    A step that fails is halved in depth, friction and bound together. `tolerance` is as in `march`. Raises NotConverged
+    where that does not help, Cancelled, and ValueError for a load state that is not allowed.
     """
     load = load.validate()
     if newton.condensed.constant:

@@ -3,6 +3,7 @@
 Any mesh can be refined by halves: each element is divided in four by its own quadratic geometry, so the meshes nest.
 """
 
+import math
 from dataclasses import dataclass, field, fields
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -114,6 +115,18 @@ class Mesh:
         """Numbers of the driven unknowns in ascending order: x of node n is 2 n, y is 2 n + 1."""
         along = np.concatenate([self.held, self.held_x]), np.concatenate([self.held, self.held_y])
         return distinct(np.concatenate([2 * along[0], 2 * along[1] + 1]))
+
+    @cached_property
+    def length_scale(self) -> float:
+        """Length by which displacements count as small or large: the root of the area [mm].
+
+        >>> two_by_half = np.moveaxis(np.mgrid[:9, :3] / 4.0, 0, -1)
+        >>> round(grid_mesh(two_by_half, np.zeros(1), slice(0, 1), np.zeros(0)).length_scale, 3)
+        1.0
+        """
+        corners = self.nodes[self.elements[:, :4]]
+        across = corners[:, 2:] - corners[:, :2]
+        return math.sqrt(abs(float(determinant(across).sum())) / 2.0)
 
     @property
     def dofs(self) -> int:

@@ -135,7 +135,7 @@ def drag_along(scene: Scene) -> int:
     return -(scene.loading.direction or 1)
 
 
-GOOD = 1e-8  # tolerance of the displacements [mm], far below the effect of any measurable difference of friction
+GOOD = 1e-9  # tolerance of displacements [-], far below the effect of any measurable difference of friction
 _NUMBERS = {name: state for state, name in STATE_NAMES.items()}
 
 

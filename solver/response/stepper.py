@@ -149,13 +149,13 @@ class FollowControl:
     stairs: int = 12  # load steps from the undeformed finger to the forces of a reading
     leading: int = 3  # iterations for each of these
     arriving: int = 8  # iterations for the last of these, and after an invalid state, at most
-    near: float = 0.01  # displacement in an iteration that ends those [mm]
+    near: float = 1e-3  # displacement in an iteration that ends those, by the length scale of the body
     least_stretch: float = 0.65  # smallest stretch of valid skin: it folds at 0.544, later on a coarse mesh
     largest_kink: float = 0.3  # largest kink of valid skin: a coarse mesh has this where skin folds
-    far: float = 0.15  # displacement in an iteration after which another follows [mm]
+    far: float = 0.01  # displacement in an iteration after which another follows, likewise
     further: int = 3  # iterations then, at most
     stiff: float = 1e3  # ratio of bulk to shear stiffness from which a kept tangent diverges (nu 0.4995)
-    furthest: float = 5.0  # displacement in an iteration beyond which the state is lost [mm]
+    furthest: float = 0.4  # displacement in an iteration beyond which the state is lost, likewise
 
 
 _CONTROL = FollowControl()
@@ -215,17 +215,18 @@ class FiniteStepper(Stepper):
         state = self._ready(normal, tangential)
         anchor = state.anchor(newton.condensed)
         forces, goes_far = ForceLoad(normal, tangential), self._goes_far(normal)
+        scale = newton.condensed.length_scale
         far, turns = (_CONTROL.near, _CONTROL.arriving) if self._behind else (_CONTROL.far, _CONTROL.further)
         for number in range(1, max(iterations, turns) + 1):
             reuse = goes_far and number == 1
             regular = newton.linearise(state, state.load, anchor(state.load), 0, forces, reuse=reuse)
             correction = newton.correct(state, anchor) if regular else None
-            if reuse and (correction is None or correction[1] > _CONTROL.furthest):
+            if reuse and (correction is None or correction[1] > _CONTROL.furthest * scale):
                 continue
-            if correction is None or correction[1] > _CONTROL.furthest or correction[0].reaches_end:
+            if correction is None or correction[1] > _CONTROL.furthest * scale or correction[0].reaches_end:
                 return self._lose(normal)
             state = correction[0]
-            if number >= iterations and not reuse and correction[1] < far:
+            if number >= iterations and not reuse and correction[1] < far * scale:
                 break
         self._stiffness = float(newton.follows(newton.steps)[1, BY_DEPTH])
         compression = self.finger.skin_compression(state)
@@ -247,8 +248,9 @@ class FiniteStepper(Stepper):
         Such an iteration takes a third of the time, and a new tangent is of more use at its end.
         """
         missing = abs(normal - float(self.state.force[1]))
-        far = self.state.touching.any() and 0.0 < _CONTROL.far * self._stiffness < missing
-        return bool(far) and self.newton.bulk < _CONTROL.stiff
+        far = _CONTROL.far * self.newton.condensed.length_scale
+        goes_far = self.state.touching.any() and 0.0 < far * self._stiffness < missing
+        return bool(goes_far) and self.newton.bulk < _CONTROL.stiff
 
     def _lose(self, normal: float) -> float:
         self.forget()

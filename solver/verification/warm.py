@@ -90,7 +90,7 @@ def _readings(scene: Scene) -> Iterator[Reading]:
     course = press_and_slide(
         loading.depth, mu, np.inf, loading.direction, press=_PRESS, slides=_SLIDES, distance=_DISTANCE
     )
-    states = [*march(finger.newton, course, tolerance=1e-6)]
+    states = [*march(finger.newton, course, tolerance=1e-7)]
     state: EquilibriumState | None = None
     for n in range(1, LIFTS):
         load = LoadState(loading.depth * (1.0 - n / LIFTS), mu, np.inf, -loading.direction)

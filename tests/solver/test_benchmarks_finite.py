@@ -53,13 +53,13 @@ def test_without_friction_the_energy_that_is_stored_is_the_work_of_the_press():
 
     def energy(depth):
         return oracle.energy(
-            newton.condensed.body, solve_full_slip(newton, LoadState(depth, 0.0, sense=1), tolerance=1e-12).u
+            newton.condensed.body, solve_full_slip(newton, LoadState(depth, 0.0, sense=1), tolerance=1e-13).u
         )
 
     def slope(step):
         return (energy(1.5 + step) - energy(1.5 - step)) / (2.0 * step)
 
-    force = solve_full_slip(newton, LoadState(1.5, 0.0, sense=1), tolerance=1e-12).force[1]
+    force = solve_full_slip(newton, LoadState(1.5, 0.0, sense=1), tolerance=1e-13).force[1]
     assert (4.0 * slope(5e-4) - slope(1e-3)) / 3.0 == pytest.approx(force, rel=1e-6)
 
 

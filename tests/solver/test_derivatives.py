@@ -184,7 +184,7 @@ def load_of(scene, depth):
 
 def slip(finger, scene, start=None):
     depth = scene.loading.indentation or 0.6
-    state = solve_full_slip(finger.newton, load_of(scene, depth), start, 1e-12)
+    state = solve_full_slip(finger.newton, load_of(scene, depth), start, 1e-13)
     if scene.normal_force is None:
         return state
     return solve_under_forces(finger.newton, state, ForceLoad(scene.normal_force, None), Termination(1e-12))

@@ -9,7 +9,7 @@ from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState
 from solver.body.finite import FiniteBody
 from solver.constitutive import NeoHooke, Ogden
 from solver.contact import LoadState
-from solver.continuation import Continuation, existence, finite_states, folds_at, limit_point
+from solver.continuation import BRANCH, Continuation, existence, finite_states, folds_at, limit_point
 from solver.equilibrium import BY_FRICTION, Newton
 from solver.equilibrium.finger import FiniteFinger, finite_laws
 from solver.equilibrium.load_stepping import solve_full_slip
@@ -85,7 +85,8 @@ def test_a_branch_that_reaches_what_was_asked_for_is_the_direct_answer():
     assert second_branch.states == (branch.last,)
     assert not second_branch.limited
     assert not branch.limited
-    np.testing.assert_allclose(branch.last.u, solve_full_slip(finger.newton, load).u, atol=1e-6)
+    close = BRANCH.tolerance * finger.newton.condensed.length_scale
+    np.testing.assert_allclose(branch.last.u, solve_full_slip(finger.newton, load).u, atol=close)
 
 
 def test_every_friction_beyond_the_end_of_a_branch_has_the_same_limit():

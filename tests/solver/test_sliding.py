@@ -32,7 +32,7 @@ REFERENCE = {
 def test_the_published_finger_answers_as_two_other_codes_found(name):
     load, sed, normal, tangential = REFERENCE[name]
     newton, probes, _ = finger(24, margin=3.0)
-    state = solve_full_slip(newton, load, tolerance=1e-7)
+    state = solve_full_slip(newton, load, tolerance=1e-8)
     assert probes.average(state.u)[0] == pytest.approx(sed, rel=0.003)
     assert state.force[1] == pytest.approx(normal, rel=0.003)
     assert load.sense * state.force[0] == pytest.approx(tangential, rel=0.003, abs=1e-12)
@@ -134,7 +134,7 @@ def test_turning_the_unloaded_body_by_a_right_angle_stores_nothing():
     np.testing.assert_allclose(force, 0.0, atol=1e-14)
 
 
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7])
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
 def test_displacements_are_as_good_as_was_asked_for_whichever_state_they_start_from(tolerance):
     newton, _, _ = finger(5)
     start = None
@@ -142,13 +142,13 @@ def test_displacements_are_as_good_as_was_asked_for_whichever_state_they_start_f
         load = REFERENCE[name][0]
         alone = solve_full_slip(newton, load, None, tolerance)
         from_last = solve_full_slip(newton, load, start, tolerance)
-        exact = solve_full_slip(newton, load, alone, 1e-13)
-        assert np.abs(alone.u - exact.u).max() < tolerance
-        assert np.abs(from_last.u - exact.u).max() < tolerance
+        exact = solve_full_slip(newton, load, alone, 1e-14)
+        assert np.abs(alone.u - exact.u).max() < tolerance * newton.condensed.length_scale
+        assert np.abs(from_last.u - exact.u).max() < tolerance * newton.condensed.length_scale
         start = solve_full_slip(newton, load, from_last, tolerance)  # leaves its tangent behind for the next surface
 
 
 def test_contact_settled_within_a_linear_system_takes_the_whole_depth_in_one_step_of_few_iterations():
     newton, _, _ = finger(8, margin=3.0)
     for name in ("slip 0", "slip 55", "slip 100", "stick 0"):
-        assert solve_full_slip(newton, REFERENCE[name][0], tolerance=1e-5).iterations <= 6
+        assert solve_full_slip(newton, REFERENCE[name][0], tolerance=1e-6).iterations <= 6

@@ -41,7 +41,7 @@ def readings(kinematics, depth, mu, direction):
     if kinematics == "finite":
         fine = finger_on_mesh("finite", 8)
         course = press_and_slide(depth, mu, np.inf, direction, press=200, slides=60, distance=6.0)
-        for finite_state in march(fine.newton, course, tolerance=1e-6):
+        for finite_state in march(fine.newton, course, tolerance=1e-7):
             yield finite_state.force[1], finite_state.force[0], fine.sed_ending(finite_state.u)
         return
     fine = finger_on_mesh("small", 12)

@@ -139,7 +139,7 @@ class LightContact:
     def slip(self, law: FrictionLaw, direction: int = 1) -> EquilibriumState:
         """Return the state of full slip at the same depth; the body moves along `direction` x."""
         load = LoadState(self.press.load.depth, law.mu, law.tau_max, -direction)
-        return solve_full_slip(self.newton, load, tolerance=1e-12)
+        return solve_full_slip(self.newton, load, tolerance=1e-13)
 
     def stick_width(self, state: EquilibriumState, mu: float) -> float:
         """Return half the width of the stick zone by a; at its ends mu p - q falls to zero."""
@@ -163,7 +163,7 @@ def light(kinematics: Kinematics = "small", nu: float = 0.4999, wide: float | No
     else:
         body = FiniteBody.of(mesh, [NeoHooke(_YOUNG, nu)])
         newton = Newton(body.condensed)
-        state = solve_full_slip(newton, LoadState(DEPTH, 0.0, sense=1), tolerance=1e-12)
+        state = solve_full_slip(newton, LoadState(DEPTH, 0.0, sense=1), tolerance=1e-13)
     load, length = float(state.normal.sum()), np.zeros(len(x))
     for first in range(0, len(x) - 1, 2):
         length[first : first + 3] += (x[first + 2] - x[first]) * np.array([1.0, 4.0, 1.0]) / 6.0
