@@ -78,12 +78,12 @@ class Bridge(QObject):
     def end(self) -> None:
         """Stop looking, and let the recorder end; a session in hand can be resumed."""
         self._timer.stop()
-        self._judge.close()
         self.model.close()
         if self.recording:
             self._client.leave()
         else:
             self._client.close()
+        self._judge.close()
 
     def session_now(self) -> float:
         return time.monotonic() + self.session_offset

@@ -113,9 +113,9 @@ class Judge:
         return self._worker
 
     def close(self) -> None:
-        """Let go of the process."""
+        """End the process, and wait for its end: a Python that leaves meanwhile may write to a pipe that is closed."""
         if self._worker is not None:
-            self._worker.shutdown(wait=False, cancel_futures=True)
+            self._worker.shutdown(cancel_futures=True)
 
     def follow(self, report: m.Report, feed: LiveFeed) -> None:
         """Follow the course: a take begins, the finger lifts."""

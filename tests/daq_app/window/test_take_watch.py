@@ -49,6 +49,15 @@ def test_a_process_that_ended_while_it_waited_for_strokes_is_replaced_at_the_nex
     assert messages == [Judged(1, 1, GOOD)]
 
 
+def test_the_process_has_ended_once_the_judge_is_closed():
+    judge = Judge(print)
+    pool = judge.prepare()
+    pool.submit(int).result()
+    [process] = pool._processes.values()
+    judge.close()
+    assert process.exitcode is not None
+
+
 PREPARED = """
 import os, signal
 from daq_app.window.stroke_quality import Judge
