@@ -3,12 +3,9 @@
 Every bench errs as its stated accuracy allows: gains and cross-talk of the forces are drawn with a standard deviation
 of 1 %, the tilt of the face with 1° about each axis. A set adds its own trouble. None of its strokes has a static peak.
 Beside a share stands that of the errors alone which all strokes of a bench have in common: chance is in both alike.
-
-Run from the repository's root: python -m benchmarks.friction_coverage [SEEDS [FIRST [SET ...]]]; by default 100 seeds
-from 5000.
 """
 
-import sys
+import argparse
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -235,11 +232,17 @@ def row(name: str, seeds: Sequence[int]) -> str:
 
 def main() -> None:
     """Print a row for each set, as the documentation holds them."""
-    count, first = (int(sys.argv[1]) if len(sys.argv) > 1 else 100), (int(sys.argv[2]) if len(sys.argv) > 2 else 5000)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("count", nargs="?", type=int, default=100, help="sessions of each set")
+    parser.add_argument("first", nargs="?", type=int, default=5000, help="seed of the first")
+    parser.add_argument("sets", nargs="*", metavar="SET", help="its name; without one, all")
+    given = parser.parse_args()
+    if unknown := set(given.sets) - set(SETS):
+        parser.error(f"there is no set {unknown}, only {list(SETS)}")
     header = ("set", *(f"`{name}`" for name in NUMBERS), "withheld", "static peaks")
     print("| " + " | ".join(header) + " |\n" + "| --- " * len(header) + "|")
-    for name in sys.argv[3:] or SETS:
-        print(row(name, range(first, first + count)), flush=True)
+    for name in given.sets or SETS:
+        print(row(name, range(given.first, given.first + given.count)), flush=True)
 
 
 if __name__ == "__main__":

@@ -1,12 +1,9 @@
 """How often a study finds which quantity its scores follow: a table for three designs (`sessions.statistics.power`).
 
-A rival is decided where its Akaike weight is at least 0.95.
-
-Run from the repository's root: python -m benchmarks.rival_recovery [STUDIES [SEED [DESIGN ...]]]; 200 of each
-quantity by default. Prints a table for the documentation.
+A rival is decided where its Akaike weight is at least 0.95. Prints a table for the documentation.
 """
 
-import sys
+import argparse
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -59,18 +56,21 @@ def row(study: str, quantity: str, alike: set[str], weights: Sequence[Mapping[st
 
 def main() -> None:
     """Print the table."""
-    count, seed = (int(sys.argv[1]) if len(sys.argv) > 1 else 200), (int(sys.argv[2]) if len(sys.argv) > 2 else 1)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("count", nargs="?", type=int, default=200, help="studies of each quantity")
+    parser.add_argument("seed", nargs="?", type=int, default=1)
+    parser.add_argument("design", nargs="*", type=int, help="its number, from 0; without one, all")
+    given = parser.parse_args()
     header = "study | true | twins | preferred | it or a twin | a wrong one of the model | decided | decided wrongly"
     print(f"| {header} | wrong most often |")
     print("| --- " * (header.count("|") + 2) + "|")
-    only = sys.argv[3:]
     for number, (study, people, design) in enumerate(STUDIES):
-        if only and str(number) not in only:
+        if given.design and number not in given.design:
             continue
-        pool = simulated_strokes(design, POOL, np.random.default_rng([seed, number]))
+        pool = simulated_strokes(design, POOL, np.random.default_rng([given.seed, number]))
         for quantity in TRUE_QUANTITIES:
-            draw = np.random.default_rng([seed, number, TRUE_QUANTITIES.index(quantity)])
-            weights = [study_weights(pool, people, len(design.mu), quantity, EFFECTS, draw) for _ in range(count)]
+            draw = np.random.default_rng([given.seed, number, TRUE_QUANTITIES.index(quantity)])
+            weights = [study_weights(pool, people, len(design.mu), quantity, EFFECTS, draw) for _ in range(given.count)]
             print(row(study, quantity, twins(pool, quantity), weights), flush=True)
 
 

@@ -1,9 +1,6 @@
-"""What a session of ten trials costs: replayed, analysed, with bootstrap intervals, and with those of its SEDs.
+"""What a session of ten trials costs: replayed, analysed, with bootstrap intervals, and with those of its SEDs."""
 
-Run from the repository's root: python -m benchmarks.session [SESSION]; without one a simulated one is recorded first.
-"""
-
-import sys
+import argparse
 import tempfile
 import time
 from collections.abc import Callable
@@ -14,6 +11,7 @@ from daq_app.cli.main import run
 from sessions.prediction import PredictionOptions, predict
 from sessions.prediction.uncertainty import with_alternatives, with_intervals
 from sessions.recording import Recording
+from sessions.recording.schema import RecordingError
 from sessions.run.replay import different_events, different_readings, replay
 from sessions.strokes import analyse
 from sessions.strokes.bootstrap import stroke_intervals
@@ -24,16 +22,20 @@ WORDS = ("run", "sensotact-friction", "--device", "sim:?seed=7&rate=200", "--sub
 
 def main() -> None:
     """Print the medians."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("session", nargs="?", type=Path, help="folder of a session; without one it is simulated")
+    session = parser.parse_args().session
     with tempfile.TemporaryDirectory() as room:
-        recording = Recording.open(_session(Path(room)))
+        try:
+            recording = Recording.open(session or _session(Path(room)))
+        except RecordingError as error:
+            parser.error(str(error))
         _print_replay(recording, Path(room))
         _print_analysis(recording)
 
 
 def _session(room: Path) -> Path:
-    """Return the folder named on the command line; without one, that of a session recorded in `room`."""
-    if len(sys.argv) > 1:
-        return Path(sys.argv[1])
+    """Return the folder of a session recorded in `room`."""
     folder = room / "session"
     run([*WORDS, "--simulate-subject", "1", "--seed", "3", "--pace", "20", "--out", str(folder)])
     return folder

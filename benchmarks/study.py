@@ -1,14 +1,14 @@
 """How a study's time falls with processes: the same simulated session many times over, on one process and on two.
 
-Run it on an idle machine: python -m benchmarks.study [SESSIONS] [small|finite]; the second word adds many paths. Every
-copy has a name of its own, so none is taken from what was computed before. Both ways take turns, so that whatever else
-the machine does falls on both alike. Prints wall times, their ratio, processor time, and what 1,000 would take.
+Run it on an idle machine: python -m benchmarks.study [SESSIONS] [small|finite]. Every copy has a name of its own, so
+none is taken from what was computed before. Both ways take turns, so that whatever else the machine does falls on both
+alike. Prints wall times, their ratio, processor time, and what 1,000 would take.
 """
 
+import argparse
 import os
 import resource
 import shutil
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -62,5 +62,8 @@ def main(count: int, options: VisitOptions) -> None:
 
 
 if __name__ == "__main__":
-    sessions = int(sys.argv[1]) if len(sys.argv) > 1 else 100
-    main(sessions, VisitOptions(paths=sys.argv[2] if len(sys.argv) > 2 else "none"))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sessions", nargs="?", type=int, default=100)
+    parser.add_argument("paths", nargs="?", choices=("none", "small", "finite"), default="none", help="many paths too")
+    given = parser.parse_args()
+    main(given.sessions, VisitOptions(paths=given.paths))
