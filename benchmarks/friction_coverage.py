@@ -236,13 +236,13 @@ def main() -> None:
     parser.add_argument("count", nargs="?", type=int, default=100, help="sessions of each set")
     parser.add_argument("first", nargs="?", type=int, default=5000, help="seed of the first")
     parser.add_argument("sets", nargs="*", metavar="SET", help="its name; without one, all")
-    given = parser.parse_args()
-    if unknown := set(given.sets) - set(SETS):
+    options = parser.parse_args()
+    if unknown := set(options.sets) - set(SETS):
         parser.error(f"there is no set {unknown}, only {list(SETS)}")
     header = ("set", *(f"`{name}`" for name in NUMBERS), "withheld", "static peaks")
     print("| " + " | ".join(header) + " |\n" + "| --- " * len(header) + "|")
-    for name in given.sets or SETS:
-        print(row(name, range(given.first, given.first + given.count)), flush=True)
+    for name in options.sets or SETS:
+        print(row(name, range(options.first, options.first + options.count)), flush=True)
 
 
 if __name__ == "__main__":

@@ -60,17 +60,18 @@ def main() -> None:
     parser.add_argument("count", nargs="?", type=int, default=200, help="studies of each quantity")
     parser.add_argument("seed", nargs="?", type=int, default=1)
     parser.add_argument("design", nargs="*", type=int, help="its number, from 0; without one, all")
-    given = parser.parse_args()
+    options = parser.parse_args()
     header = "study | true | twins | preferred | it or a twin | a wrong one of the model | decided | decided wrongly"
     print(f"| {header} | wrong most often |")
     print("| --- " * (header.count("|") + 2) + "|")
     for number, (study, people, design) in enumerate(STUDIES):
-        if given.design and number not in given.design:
+        if options.design and number not in options.design:
             continue
-        pool = simulated_strokes(design, POOL, np.random.default_rng([given.seed, number]))
+        pool = simulated_strokes(design, POOL, np.random.default_rng([options.seed, number]))
         for quantity in TRUE_QUANTITIES:
-            draw = np.random.default_rng([given.seed, number, TRUE_QUANTITIES.index(quantity)])
-            weights = [study_weights(pool, people, len(design.mu), quantity, EFFECTS, draw) for _ in range(given.count)]
+            draw = np.random.default_rng([options.seed, number, TRUE_QUANTITIES.index(quantity)])
+            repeats = range(options.count)
+            weights = [study_weights(pool, people, len(design.mu), quantity, EFFECTS, draw) for _ in repeats]
             print(row(study, quantity, twins(pool, quantity), weights), flush=True)
 
 

@@ -65,5 +65,5 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sessions", nargs="?", type=int, default=100)
     parser.add_argument("paths", nargs="?", choices=("none", "small", "finite"), default="none", help="many paths too")
-    given = parser.parse_args()
-    main(given.sessions, VisitOptions(paths=given.paths))
+    arguments = parser.parse_args()
+    main(arguments.sessions, VisitOptions(paths=arguments.paths))
