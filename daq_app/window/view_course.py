@@ -304,14 +304,14 @@ def _stroke(session: SessionState, targets: tuple[TrialState, ...]) -> StrokeVie
     if trial is None or trial.quality is None:
         return StrokeView("none", tr("No stroke yet."))
     quality, code = trial.quality, trial.trial.stimulus.code
-    texts, share = [tr("Stroke on {code}", code=code)], 100 * (quality.fell or 0.0)
+    texts = [tr("Stroke on {code}", code=code)]
     if (stroke := quality.stroke) is not None:
         steady = stroke.steady
         texts += [] if steady is None else [tr("steady {duration:.1f} s", duration=steady[1] - steady[0])]
         texts += [] if stroke.mu_dynamic is None else [_mu(stroke)]
         texts += [] if stroke.speed is None else [quantity(stroke.speed, 0, "mm/s")]
-    if quality.fell is not None:
-        template = tr_noop("N fell {share:.0f} %") if share >= 0 else tr_noop("N rose {share:.0f} %")
+    if share := round(100 * (quality.fell or 0.0)):
+        template = tr_noop("N fell {share:.0f} %") if share > 0 else tr_noop("N rose {share:.0f} %")
         texts.append(tr(template, share=abs(share)))
     texts.append(tr("good") if quality.grade == "good" else "; ".join(tr(text) for text in quality.texts))
     redo = steps.Redo(quality.texts[0]) if quality.texts and trial in targets else None

@@ -123,6 +123,12 @@ def test_a_good_stroke_is_redone_only_with_a_reason_that_is_asked_for():
     assert course.buttons["redo"].sends is None
 
 
+@pytest.mark.parametrize(("fell", "text"), [(0.004, "mm/s · good"), (-0.07, "N rose 7 % · good")])
+def test_a_change_of_force_is_named_where_it_is_a_per_cent(fell, text):
+    stroke = derive_view(after(*SCORE, Judged(1, 1, replace(GOOD, fell=fell)))).course.stroke
+    assert stroke.text.endswith(text)
+
+
 def test_what_was_found_of_a_take_that_was_done_again_meanwhile_is_not_shown():
     state = after(*SCORE, steps.StartTake(1, 2), Judged(1, 1, BAD))
     assert derive_view(state).course.stroke.grade == "none"
