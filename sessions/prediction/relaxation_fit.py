@@ -71,7 +71,9 @@ class RelaxationFit:
         return msgspec.to_builtins(self)
 
     def relaxing(self, scene: Scene) -> Scene:
-        """Return a scene whose layers are as stiff at once as found here and relax."""
+        """Return a scene whose layers are as stiff at once as found here and relax; as it is where none may."""
+        if _may_be_none(self.part):
+            return scene
         term = (Relaxation(self.part.value, self.time.value),)
         layers = {name: scene.materials.of(name) for name in LAYERS}
         prony_layers = {name: replace(layer, E=layer.E * self.at_once, prony=term) for name, layer in layers.items()}
@@ -197,8 +199,12 @@ def _interval(values: Array, weight: Array) -> tuple[float, float]:
     return low, high
 
 
+def _may_be_none(part: Interval) -> bool:
+    return part.low is not None and part.low < LEAST_PART
+
+
 def _sentence(part: Interval, time: Interval) -> str:
-    if part.low is not None and part.low < LEAST_PART:
+    if _may_be_none(part):
         return "The holds do not show that the finger relaxes: the part that does may be none."
     if time.high is None or part.high is None:
         return "The finger still relaxes when the holds end: hold longer to know how far and for how long it goes on."

@@ -80,6 +80,7 @@ def test_a_finger_that_does_not_relax_is_not_said_to(model, elastic):
     estimate = relaxation(model, elastic, [hold_curve(elastic, p, 0.0, 1.0, np.random.default_rng(3)) for p in (0, 1)])
     assert estimate.part.low <= 0.01
     assert "do not show" in estimate.sentence
+    assert estimate.relaxing(published()) == published()
 
 
 def test_a_hold_that_is_much_shorter_than_the_time_bounds_neither_and_says_so(model, elastic):
