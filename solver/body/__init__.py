@@ -105,7 +105,7 @@ class CondensedLinear:
         `stiffness` (2 k, 2 k) and the condensed dead `load` (2 k,) list x, y of one node after the other.
         """
         self.constant, self.bulk = True, 0.0
-        self.length_scale = float(np.ptp(rest, axis=0).max()) if len(rest) else 0.0
+        self.length_scale = float(np.ptp(rest, axis=0).max()) if len(rest) else 0.0  # the extent of the skin
         self.rest, self.stiffness, self.load = rest, stiffness, load
         self.fixed_length, self.held, self.middle = length, held, np.zeros(len(rest), np.int32)
         self.motions = np.zeros((2 * len(rest), 0))  # rigid motions that the surface alone balances

@@ -220,8 +220,8 @@ class Continuation:
     def unit(self) -> float:
         """Displacement of one unknown that counts as much as a unit of the parameter, a friction or a mm [mm]."""
         newton = self.body.newton
-        whole = BRANCH.unit * newton.condensed.length_scale if self.parameter == BY_FRICTION else 1.0
-        return whole * float(np.sqrt(len(newton.steps)))
+        norm = BRANCH.unit * newton.condensed.length_scale if self.parameter == BY_FRICTION else 1.0
+        return norm * float(np.sqrt(len(newton.steps)))
 
     def _point(self, state: EquilibriumState) -> _Point:
         return _Point(state, self.body.skin_compression(state), self._value(state.load))
