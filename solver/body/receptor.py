@@ -11,7 +11,7 @@ from solver.mesh.mesher import FingerMesh
 from solver.scene.tables import Receptor
 
 _POINTS, _WEIGHTS = GAUSS_3
-_ASIDE = 1e-7  # distance of probes on both sides of a line between elements [mm]
+_ASIDE = 2e-8  # distance of probes on both sides of a line between elements, by the tip radius
 
 
 def endings(finger: FingerMesh, centre: Array, receptor: Receptor, arcs: Array) -> Endings:
@@ -39,7 +39,7 @@ def endings(finger: FingerMesh, centre: Array, receptor: Receptor, arcs: Array) 
 
 def middle(finger: FingerMesh, centre: Array, receptor: Receptor) -> Endings:
     """Return the midpoint of the reference ending, as the mean of the limits from the elements around it."""
-    aside = np.array([-_ASIDE, _ASIDE])
+    aside = _ASIDE * finger.outline.finger.tip_radius * np.array([-1.0, 1.0])
     probes, tangent = _probes(finger, centre, aside, receptor.depth + aside), finger.outline.tangent(aside)
     return Endings(probes, np.full(4, 0.25), np.zeros(4, np.int64), 1, np.repeat(tangent, 2, axis=0))
 

@@ -324,7 +324,7 @@ class _Row:
         ends = [outline.palmar_cut, outline.palmar, outline.dorsal, outline.dorsal_cut]
         if outline.finger.nail_length > 0.0:
             ends.append(outline.nail_end)
-        ends = _framed(ends, near, far)
+        ends = _framed(ends, (near, far), outline.finger)
         least = tuple(2 if end in (outline.palmar_cut, outline.dorsal) else 1 for end in ends[:-1])
         return _Row(arc, _cumulative_count(arc, sizes), ends, least, 0.2)
 
@@ -370,7 +370,7 @@ def _layers(finger: Finger, fine: float, size: float, receptor: Receptor, thin: 
         above, below, largest = _around_point(depth, near, far, _SIZES.at_point * size)
         near, far = min(near, max(above, top)), max(far, min(below, bottom))
         sizes = np.minimum(sizes, largest)
-    ends = _framed([0.0, finger.epidermis, skin, skin + thick], near, far)
+    ends = _framed([0.0, finger.epidermis, skin, skin + thick], (near, far), finger)
     # a single element between epidermis and ending is too stiff in shear, whatever its size
     least = [2 if end < near <= next_end and end > 0.0 else 1 for end, next_end in pairwise(ends[:-1])]
     row = _Row(depth, _cumulative_count(depth, sizes), ends, (*least, 2), 0.1)
@@ -391,10 +391,10 @@ def _around_point(place: Array, near: float, far: float, size: float) -> tuple[f
     return middle - size / 2.0, middle + size / 2.0, largest
 
 
-def _framed(ends: Sequence[float], *frame: float) -> tuple[float, ...]:
-    """Return the `ends` in order, and among them those of the `frame` that no other lies within a micrometre of."""
+def _framed(ends: Sequence[float], frame: Sequence[float], finger: Finger) -> tuple[float, ...]:
+    """Return the `ends` in order, and among them those of the `frame` that leave room for an element before others."""
     out = list(ends)
     for place in frame:
-        if min(abs(place - end) for end in out) > 1e-3:
+        if min(abs(place - end) for end in out) > FINEST * finger.tip_radius:
             out.append(place)
     return tuple(sorted(out))
