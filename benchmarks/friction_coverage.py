@@ -238,7 +238,7 @@ def main() -> None:
     parser.add_argument("sets", nargs="*", metavar="SET", help="its name; without one, all")
     options = parser.parse_args()
     if unknown := set(options.sets) - set(SETS):
-        parser.error(f"there is no set {unknown}, only {list(SETS)}")
+        parser.error(f"there is no set {', '.join(unknown)}; there are {', '.join(SETS)}")
     header = ("set", *(f"`{name}`" for name in NUMBERS), "withheld", "static peaks")
     print("| " + " | ".join(header) + " |\n" + "| --- " * len(header) + "|")
     for name in options.sets or SETS:

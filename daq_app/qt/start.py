@@ -175,7 +175,12 @@ def _show_window(build: "Callable[[QApplication], QWidget]") -> int:
     def stop(number: int, _frame: object) -> None:
         """Close the window as its button does: it asks first while a session is recorded, but not on SIGTERM."""
         codes.append(STOPPED)
-        QTimer.singleShot(0, lambda: window.close() or number == signal.SIGINT or window.close())
+
+        def close() -> None:
+            if not window.close() and number == signal.SIGTERM:
+                window.close()  # it asks once
+
+        QTimer.singleShot(0, close)
 
     signal.signal(signal.SIGINT, stop)
     signal.signal(signal.SIGTERM, stop)

@@ -71,7 +71,7 @@ class RelaxationFit:
         return msgspec.to_builtins(self)
 
     def relaxing(self, scene: Scene) -> Scene:
-        """Return a scene whose layers are as stiff at once as found here and relax; as it is where none may."""
+        """Return `scene` with layers that relax, as stiff at once as found here; unchanged where the part may be none."""
         if _may_be_none(self.part):
             return scene
         term = (Relaxation(self.part.value, self.time.value),)

@@ -220,7 +220,7 @@ class Continuation:
     def unit(self) -> float:
         """Displacement of one unknown that counts as much as a unit of the parameter, a friction or a mm [mm]."""
         newton = self.body.newton
-        norm = BRANCH.unit * newton.condensed.length_scale if self.parameter == BY_FRICTION else 1.0
+        norm = BRANCH.unit * newton.length_scale if self.parameter == BY_FRICTION else 1.0
         return norm * float(np.sqrt(len(newton.steps)))
 
     def _point(self, state: EquilibriumState) -> _Point:
@@ -268,9 +268,9 @@ class Continuation:
             load = self._with_value(load, current + change)
             state, largest, changes = newton.apply_step(state, load, step * unit, newton.skin_x)
             total = total + step
-            if not largest < newton.condensed.length_scale:
+            if not largest < newton.length_scale:
                 return None
-            if largest < BRANCH.tolerance * newton.condensed.length_scale and not changes:
+            if largest < BRANCH.tolerance * newton.length_scale and not changes:
                 moved = self._value(load) - start.value
                 distance = np.sqrt(total @ total + moved**2)
                 return state if direction @ total + rate * moved > BRANCH.turn * distance else None

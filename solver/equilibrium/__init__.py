@@ -146,7 +146,7 @@ class Newton:
             np.zeros((2 * skin, 4)), np.zeros(2),
         )  # fmt: skip
         self.steps = self.system.steps  # (2 k, 4) of the skin, which the kernels fill
-        self.bulk = condensed.bulk
+        self.bulk, self.length_scale = condensed.bulk, condensed.length_scale
         self.skin = Skin(condensed.held, condensed.middle, condensed.fixed_length)
         self._rest = condensed.undeformed()[0]
         self.skin_x = condensed.place(self._rest)[:, 0].copy()
@@ -183,7 +183,7 @@ class Newton:
         """Solve the contact of the linearised body at `state`; return the result of `solve_active_set`."""
         body = self.condensed
         self._states.state[:], self._states.sense[:] = state.state, state.sense
-        stride = np.inf if body.constant else CONTROL.stride * body.length_scale
+        stride = np.inf if body.constant else CONTROL.stride * self.length_scale
         kind, drag, push = DEPTH_CONTROL, 0.0, 0.0
         if forces is not None:
             kind = PUSH_CONTROL if forces.tangential is None else DRAG_CONTROL
@@ -273,7 +273,7 @@ class Newton:
         """Return the equilibrium that iterations from `begin` end in. Raises NotConverged."""
         state = previous = begin
         reuse = self.condensed.equilibrium is begin.u
-        size = self.condensed.length_scale
+        size = self.length_scale
         scale, first, last, new, equal_steps = 1.0, 0.0, 0.0, False, 0
         for _ in range(termination.limit):
             if reuse:

@@ -120,7 +120,7 @@ class LoadPath:
         self.energies: list[Array] = []  # of its endings, at every instant after the first [MPa]
         self.sense = 0  # direction of the friction force on relaxing skin; 0: unknown
         self.newton = newton
-        self._termination = Termination(tolerance * (loading.indentation or 0.0) / newton.condensed.length_scale)
+        self._termination = Termination(tolerance * (loading.indentation or 0.0) / newton.length_scale)
         self.frictionless = friction.frictionless
         self.by_force = loading.normal_force is not None
         # a drag needs friction

@@ -189,7 +189,7 @@ def _find_travel(
         return float(near.force[0]) - drag, near
 
     close = DRAG_TOLERANCE * state.load.mu * forces.normal
-    state_at_drag = find_root(drag_error, state.load.travel, close, newton.condensed.length_scale)
+    state_at_drag = find_root(drag_error, state.load.travel, close, newton.length_scale)
     if state_at_drag is None:
         raise NotConverged("no travel meets the drag")
     return state_at_drag

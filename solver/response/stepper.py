@@ -215,7 +215,7 @@ class FiniteStepper(Stepper):
         state = self._ready(normal, tangential)
         anchor = state.anchor(newton.condensed)
         forces, goes_far = ForceLoad(normal, tangential), self._goes_far(normal)
-        scale = newton.condensed.length_scale
+        scale = newton.length_scale
         far, turns = (_CONTROL.near, _CONTROL.arriving) if self._behind else (_CONTROL.far, _CONTROL.further)
         for number in range(1, max(iterations, turns) + 1):
             reuse = goes_far and number == 1
@@ -248,7 +248,7 @@ class FiniteStepper(Stepper):
         Such an iteration takes a third of the time, and a new tangent is of more use at its end.
         """
         missing = abs(normal - float(self.state.force[1]))
-        far = _CONTROL.far * self.newton.condensed.length_scale
+        far = _CONTROL.far * self.newton.length_scale
         goes_far = self.state.touching.any() and 0.0 < far * self._stiffness < missing
         return bool(goes_far) and self.newton.bulk < _CONTROL.stiff
 

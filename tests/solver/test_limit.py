@@ -85,7 +85,7 @@ def test_a_branch_that_reaches_what_was_asked_for_is_the_direct_answer():
     assert second_branch.states == (branch.last,)
     assert not second_branch.limited
     assert not branch.limited
-    close = BRANCH.tolerance * finger.newton.condensed.length_scale
+    close = BRANCH.tolerance * finger.newton.length_scale
     np.testing.assert_allclose(branch.last.u, solve_full_slip(finger.newton, load).u, atol=close)
 
 
