@@ -71,7 +71,7 @@ class RelaxationFit:
         return msgspec.to_builtins(self)
 
     def relaxing(self, scene: Scene) -> Scene:
-        """Return `scene` with layers that relax, as stiff at once as found here; unchanged where the part may be none."""
+        """Return `scene` with layers that relax, as stiff at once as found; unchanged where the part may be none."""
         if _may_be_none(self.part):
             return scene
         term = (Relaxation(self.part.value, self.time.value),)
