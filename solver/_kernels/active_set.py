@@ -9,7 +9,7 @@ import numpy as np
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, compile_loop, subroutine
 from solver._kernels.contact_system import (
     RIGHT_SIDES,
-    STEEP,
+    SHEAR_LIMITED_MU,
     assemble_contact_system,
     assemble_force_system,
     bounded_length,
@@ -80,7 +80,7 @@ def touching_state(load: LoadArguments) -> int:
     With steep friction, slip is a bad guess: the node's own drag may lift it off by more than it is pressed.
     """
     if load.sense != 0:
-        return SHEAR_LIMITED if load.mu > STEEP and load.tau < np.inf else SLIP
+        return SHEAR_LIMITED if load.mu > SHEAR_LIMITED_MU and load.tau < np.inf else SLIP
     return STICK if load.mu > 0.0 and load.tau > 0.0 else SLIP
 
 

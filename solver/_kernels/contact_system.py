@@ -24,7 +24,7 @@ ZERO = 1e-15  # a pivot below this, relative to the largest diagonal entry, is r
 # tributary lengths of an edge's first, middle and last node by the positions of the three: Simpson's rule
 _LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
 
-STEEP = 1.0  # above this coefficient of friction, a node that comes into contact is first assumed to be shear-limited
+SHEAR_LIMITED_MU = 1.0  # with more friction, a node that comes into contact is first assumed to be shear-limited
 
 
 @compile_loop

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from solver.accuracy.omitted_effects import RELAXATION, sideways, with_left_out
-from solver.continuation.finite_states import roughly
+from solver.continuation.finite_states import rough_state
 from solver.continuation.small_states import settled_state
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.load_path import PRESSING_TIME, Aim, undeformed_path
@@ -105,7 +105,7 @@ def residual_overstress(prediction: Prediction) -> ResidualOverstress | None:
         aims += [Aim(PRESSING_TIME + slide_s * part, depth, direction * slide * part) for part in parts]
     try:
         finger = _coarse_finger(scene.frictionless_press(depth), get_ident())
-        state = roughly(finger, scene) if isinstance(finger, FiniteFinger) else settled_state(scene, finger)
+        state = rough_state(finger, scene) if isinstance(finger, FiniteFinger) else settled_state(scene, finger)
         at_last = finger.sed_ending(finger.displacement(state))
         path = undeformed_path(scene, finger, relaxing=True)
         for aim in aims:

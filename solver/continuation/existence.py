@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED
-from solver._kernels.contact_system import STEEP
+from solver._kernels.contact_system import SHEAR_LIMITED_MU
 from solver.contact import LoadState
 from solver.continuation import Continuation
-from solver.continuation.limit_point import LIMIT, Reach, is_folded, of_depth, of_friction, sound
+from solver.continuation.limit_point import LIMIT, Reach, is_folded, is_sound, reach_in_depth, reach_in_friction
 from solver.equilibrium import TO_ROUND_OFF, EquilibriumState, Newton
 from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_stepping import solve_full_slip
@@ -22,7 +22,7 @@ ALIKE = 0.1  # relative difference of SED and forces below which states of two m
 BEYOND_LIMIT = 0.06  # relative distance beyond a limit at which another path is tried: twice the 3 % accuracy of limits
 
 
-def steady(
+def proven_slide(
     finger: FiniteFinger,
     load: LoadState,
     tolerance: float = TO_ROUND_OFF.tolerance,
@@ -36,7 +36,7 @@ def steady(
     """
     candidates: list[EquilibriumState] = []
     for state in _direct_states(finger.newton, load, tolerance, start):
-        if sound(finger, state, LIMIT.plain):
+        if is_sound(finger, state, LIMIT.plain):
             return state
         candidates.append(state)
     proof = _reach_towards(finger.scene, load)
@@ -45,9 +45,9 @@ def steady(
     if proof.limited:
         raise _refusal(finger.scene, load, proof)
     for state in candidates:
-        if _proven(finger, state, proof):
+        if _agrees(finger, state, proof):
             return state
-    if steep(load):
+    if is_mostly_shear_limited(load):
         raise NotConverged(
             f"At {load.depth:.3g} mm of indentation there is settled sliding at mu = {load.mu:.3g}, nearly all of the "
             "skin slipping at the bound, and this mesh does not find it: another tolerance has another mesh"
@@ -55,7 +55,7 @@ def steady(
     branch = Continuation(finger, proof.search.parameter, 0.0).trace(proof.search.start(finger), proof.search.target)
     if not branch.limited:
         state = solve_full_slip(finger.newton, load, branch.last, tolerance)
-        if _proven(finger, state, proof):
+        if _agrees(finger, state, proof):
             return state
     limit = "depth" if proof.by_depth else "friction"
     raise NotConverged(
@@ -64,19 +64,19 @@ def steady(
     )
 
 
-def stands(finger: FiniteFinger, state: EquilibriumState) -> bool:
+def is_on_branch(finger: FiniteFinger, state: EquilibriumState) -> bool:
     """Return whether a state lies on the branch from the frictionless state, where need be by following that."""
-    if sound(finger, state, LIMIT.plain):
+    if is_sound(finger, state, LIMIT.plain):
         return True
-    if not sound(finger, state):
+    if not is_sound(finger, state):
         return False
     proof = _reach_towards(finger.scene, state.load)
-    return not proof.limited and _proven(finger, state, proof)
+    return not proof.limited and _agrees(finger, state, proof)
 
 
-def steep(load: LoadState) -> bool:
+def is_mostly_shear_limited(load: LoadState) -> bool:
     """Return whether mu is so large that nearly all skin in contact is shear-limited."""
-    return load.mu > STEEP and load.tau < np.inf
+    return load.mu > SHEAR_LIMITED_MU and load.tau < np.inf
 
 
 def refuse_far_beyond(scene: Scene, load: LoadState) -> None:
@@ -96,13 +96,13 @@ def _direct_states(
 ) -> Iterator[EquilibriumState]:
     """Yield the states found directly from `start`, from the undeformed state, and from shear-limited skin.
 
-    Where friction is `steep`, the undeformed state leads to no further state.
+    Where nearly all skin is shear-limited, the undeformed state leads to no further state.
     """
     ways: list[Callable[[], EquilibriumState]] = []
-    if not steep(load):
+    if not is_mostly_shear_limited(load):
         ways.append(lambda: solve_full_slip(newton, load, None, tolerance))
     if load.tau < np.inf:
-        ways.append(lambda: all_at_the_bound(newton, load, tolerance))
+        ways.append(lambda: slide_from_limited_skin(newton, load, tolerance))
     if start is not None:
         ways.insert(0, lambda: solve_full_slip(newton, load, start, tolerance))
     for search in ways:
@@ -110,9 +110,9 @@ def _direct_states(
             yield search()
 
 
-def doubts(finger: FiniteFinger, state: EquilibriumState) -> tuple[str, ...]:
+def limit_warnings(finger: FiniteFinger, state: EquilibriumState) -> tuple[str, ...]:
     """Return a warning for a settled slide near the limit of friction, else nothing."""
-    if state.load.sense == 0 or sound(finger, state, LIMIT.plain):
+    if state.load.sense == 0 or is_sound(finger, state, LIMIT.plain):
         return ()
     proof = _reach_towards(finger.scene, state.load)
     if not proof.near:
@@ -132,14 +132,14 @@ def _reach_towards(scene: Scene, load: LoadState) -> Reach:
     the tissue skin folds without friction, and slides with some: there the branch by friction has no first state.
     """
     if load.frictionless:
-        return of_depth(scene, load)
+        return reach_in_depth(scene, load)
     try:
-        proof = of_friction(scene, load, load.mu)
+        proof = reach_in_friction(scene, load, load.mu)
     except NotConverged:
-        return of_depth(scene, load)
+        return reach_in_depth(scene, load)
     if proof.limited:
         with suppress(NotConverged):
-            deepest = of_depth(scene, load)
+            deepest = reach_in_depth(scene, load)
             return proof if deepest.limited else deepest
     return proof
 
@@ -167,7 +167,7 @@ def _refusal(scene: Scene, load: LoadState, proof: Reach) -> NoSteadyState | Not
     )
     beyond = ""
     with suppress(NotConverged):
-        deepest = of_depth(scene, load)
+        deepest = reach_in_depth(scene, load)
         further = load._replace(depth=(1.0 + BEYOND_LIMIT) * deepest.value)
         if deepest.ends and _none_at(scene, further, load):
             depth = deepest.value
@@ -202,11 +202,11 @@ def _none_at(scene: Scene, further: LoadState, load: LoadState) -> bool:
     if further.depth >= load.depth and further.mu >= load.mu:
         return True
     shallower = further.depth < load.depth
-    proof = of_friction(scene, further, load.mu) if shallower else of_depth(scene, further)
+    proof = reach_in_friction(scene, further, load.mu) if shallower else reach_in_depth(scene, further)
     return proof.ends
 
 
-def _proven(finger: FiniteFinger, state: EquilibriumState, proof: Reach) -> bool:
+def _agrees(finger: FiniteFinger, state: EquilibriumState, proof: Reach) -> bool:
     """Return whether a state agrees with the end of the branch on another mesh, and is not folded."""
     if is_folded(finger, state):
         return False
@@ -215,7 +215,7 @@ def _proven(finger: FiniteFinger, state: EquilibriumState, proof: Reach) -> bool
     return bool(np.all(np.abs(change) <= ALIKE * size))
 
 
-def all_at_the_bound(newton: Newton, load: LoadState, tolerance: float) -> EquilibriumState:
+def slide_from_limited_skin(newton: Newton, load: LoadState, tolerance: float) -> EquilibriumState:
     """Return the settled slide from the frictionless one, with all its contact shear-limited and a growing bound.
 
     Under a low bound and a large mu, skin is shear-limited at small pressures, so that slip is a bad first guess.

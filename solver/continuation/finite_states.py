@@ -13,8 +13,14 @@ from solver.body.validation import check_loads
 from solver.constitutive import Law
 from solver.contact import ForceLoad, LoadState
 from solver.continuation import LARGEST_MU, Continuation, folds_at, jumped_branch
-from solver.continuation.existence import BEYOND_LIMIT, all_at_the_bound, stands, steady, steep
-from solver.continuation.limit_point import Reach, of_depth
+from solver.continuation.existence import (
+    BEYOND_LIMIT,
+    is_mostly_shear_limited,
+    is_on_branch,
+    proven_slide,
+    slide_from_limited_skin,
+)
+from solver.continuation.limit_point import Reach, reach_in_depth
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, Newton, Termination, load_stepping
 from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import march, slide_or_hold
@@ -56,10 +62,10 @@ def settled_state(
         return march(scene, finger, times).last
     if scene.normal_force is not None:
         return _state_under_force(finger, scene, scene.normal_force, start, times)
-    return steady(finger, sliding_load(scene), start=start)
+    return proven_slide(finger, sliding_load(scene), start=start)
 
 
-def nearby(finger: FiniteFinger, scene: Scene, start: EquilibriumState) -> EquilibriumState | None:
+def slide_near(finger: FiniteFinger, scene: Scene, start: EquilibriumState) -> EquilibriumState | None:
     """Return the settled slide within a few iterations from `start`; None where there is none, or it is unproven."""
     newton, force = finger.newton, scene.normal_force
     try:
@@ -69,13 +75,13 @@ def nearby(finger: FiniteFinger, scene: Scene, start: EquilibriumState) -> Equil
             near = replace(start, load=sliding_load(scene)._replace(depth=start.load.depth, travel=start.load.travel))
             state = solve_under_forces(newton, near, ForceLoad(force, None), ON_NESTED_MESH)
             state = newton.settle(state, state.load, ON_NESTED_MESH)
-        return state if stands(finger, state) else None
+        return state if is_on_branch(finger, state) else None
     except NotConverged:
         return None
 
 
-def roughly(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None = None) -> EquilibriumState:
-    """Return an approximate settled state, a start for others if it is `sound`. Raises as `settled_state`.
+def rough_state(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None = None) -> EquilibriumState:
+    """Return an approximate settled state, a start for others where `is_sound` says so. Raises as `settled_state`.
 
     The search begins at `near`, the settled state of another surface, where that slides in the same direction.
     """
@@ -129,36 +135,36 @@ def _sliding_under(
     """Return the settled slide under the normal force of a scene, from `start` or as the force grows."""
     newton = finger.newton
     load = sliding_load(scene)
-    at_bound = steep(load)
+    at_bound = is_mostly_shear_limited(load)
     if start is not None:
         near = replace(start, load=load._replace(depth=start.load.depth, travel=start.load.travel))
         with suppress(NotConverged):
             state = (
                 _at_force(newton, near, force) if at_bound else solve_under_forces(newton, near, ForceLoad(force, None))
             )
-            return steady(finger, state.load, start=state)
+            return proven_slide(finger, state.load, start=state)
     if at_bound:
         with suppress(NotConverged):
             *_, bare = _increase_force(newton, load._replace(mu=0.0), force)
-            begin = all_at_the_bound(newton, load._replace(depth=bare.load.depth), FORCE_SEARCH.leading)
+            begin = slide_from_limited_skin(newton, load._replace(depth=bare.load.depth), FORCE_SEARCH.leading)
             state = _at_force(newton, begin, force)
-            return steady(finger, state.load, start=state)
+            return proven_slide(finger, state.load, start=state)
     states: list[EquilibriumState] = []
     try:
         for state in _increase_force(newton, load, force):
             states.append(state)  # those before a failure count
     except NotConverged as failure:
         if states:
-            return _deeper(finger, states[-1], force)
-        proof = of_depth(scene, load._replace(depth=scene.finger.bone_depth()))
+            return _slide_deeper(finger, states[-1], force)
+        proof = reach_in_depth(scene, load._replace(depth=scene.finger.bone_depth()))
         if proof.ends and proof.numbers[1] < force:  # even the deepest slide carries less
             raise _beyond(proof.value, float(proof.numbers[1])) from failure
         raise
     *before, last = states
     try:
-        return steady(finger, last.load, start=last)
+        return proven_slide(finger, last.load, start=last)
     except NoSteadyState:  # it lies beyond a limit, which has a force as well as a depth
-        return _deeper(finger, before[-1], force)
+        return _slide_deeper(finger, before[-1], force)
 
 
 def _increase_force(newton: Newton, load: LoadState, force: float) -> Iterator[EquilibriumState]:
@@ -186,17 +192,17 @@ def _at_force(newton: Newton, start: EquilibriumState, force: float) -> Equilibr
     raise NotConverged(f"No depth was found at which the finger presses with {force:.4g} N/mm: give a depth instead.")
 
 
-def _deeper(finger: FiniteFinger, state: EquilibriumState, force: float) -> EquilibriumState:
+def _slide_deeper(finger: FiniteFinger, state: EquilibriumState, force: float) -> EquilibriumState:
     """Return the settled slide under `force` [N/mm] deeper than `state`, beyond which force control failed.
 
     `limit_point` finds the largest depth and its force. Where a slightly deeper state exists nevertheless, the search
     continues there. Raises as `settled_state`.
     """
-    proof = of_depth(finger.scene, state.load._replace(depth=FORCE_SEARCH.beyond * state.load.depth))
+    proof = reach_in_depth(finger.scene, state.load._replace(depth=FORCE_SEARCH.beyond * state.load.depth))
     if proof.ends and proof.numbers[1] < force:
         state = _slide_reaching_force(finger, state, proof, force)
     state = _at_force(finger.newton, state, force)
-    return steady(finger, state.load, start=state)
+    return proven_slide(finger, state.load, start=state)
 
 
 def _slide_reaching_force(
@@ -211,7 +217,7 @@ def _slide_reaching_force(
     while most < force:
         report_progress("trying whether the finger slides deeper than it was followed to", most / force)
         try:
-            state = steady(finger, state.load._replace(depth=(1.0 + BEYOND_LIMIT) * depth), start=state)
+            state = proven_slide(finger, state.load._replace(depth=(1.0 + BEYOND_LIMIT) * depth), start=state)
         except NoSteadyState as failure:
             raise _beyond(depth, most) from failure
         depth, most = state.load.depth, float(state.force[1])

@@ -39,7 +39,7 @@ class LimitControl:
 LIMIT = LimitControl()
 
 
-def sound(finger: FiniteFinger, state: EquilibriumState, least: float = LIMIT.sound) -> bool:
+def is_sound(finger: FiniteFinger, state: EquilibriumState, least: float = LIMIT.sound) -> bool:
     """Return whether the skin is stretched to more than `least` everywhere, without a crease or self-contact."""
     compression = finger.skin_compression(state)
     return compression.lowest >= least and compression.kink <= BRANCH.crease and not finger.crosses(state)
@@ -110,7 +110,7 @@ class BranchSearch:
             with suppress(NotConverged):
                 load = self.load._replace(depth=part * self.target)
                 start = solve_full_slip(finger.newton, load, None, BRANCH.tolerance)
-                if sound(finger, start):
+                if is_sound(finger, start):
                     return start
         raise NotConverged(
             f"no sliding state was found at mu = {self.load.mu:.3g} even at {LIMIT.starts[-1] * self.target:.3g} "
@@ -126,7 +126,7 @@ class BranchSearch:
                 continue
             with suppress(NotConverged):
                 start = solve_full_slip(fine.newton, state.load, fine.transfer(state, rough), BRANCH.tolerance)
-                if sound(fine, start) or state is states[0]:
+                if is_sound(fine, start) or state is states[0]:
                     return start
         return self.start(fine)
 
@@ -158,7 +158,7 @@ class Reach:
         return self.search.parameter == BY_DEPTH
 
 
-def of_friction(scene: Scene, load: LoadState, target: float) -> Reach:
+def reach_in_friction(scene: Scene, load: LoadState, target: float) -> Reach:
     """Return the range of slides at the depth and bound of `load`, from mu = 0 to `target`.
 
     Raises NotConverged where not even the frictionless state is found, Cancelled.
@@ -168,7 +168,7 @@ def of_friction(scene: Scene, load: LoadState, target: float) -> Reach:
     )
 
 
-def of_depth(scene: Scene, load: LoadState) -> Reach:
+def reach_in_depth(scene: Scene, load: LoadState) -> Reach:
     """Return the range of slides at the friction of `load`, from a small depth to that of `load`.
 
     Raises NotConverged where no slide is found even at a hundredth of that depth, Cancelled.
@@ -206,7 +206,7 @@ def _reach(search: BranchSearch) -> Reach:
             return end
     finger = search.finger()
     branch = search.stop(finger, coarse)
-    if branch.limited or not sound(finger, branch.last, LIMIT.plain):
+    if branch.limited or not is_sound(finger, branch.last, LIMIT.plain):
         finger, branch, place = search.trace_on_fine_mesh(finger, branch.states)
         if abs(_place_of_least_stretch(finger, branch.last) - place) > LIMIT.astray * search.scene.finger.tip_radius:
             finger, branch, _ = search.trace_on_fine_mesh(finger, branch.states)

@@ -204,7 +204,7 @@ def follow_friction(scene: Scene, finger: LinearFinger) -> tuple[EquilibriumStat
         return None, 0.0
     state, limit = continue_in_friction(finger.newton, load, force, first)
     if limit == 0.0:
-        in_tissue(scene, finger, first.load.depth)
+        refuse_beyond_tissue(scene, finger, first.load.depth)
     return state, limit
 
 
@@ -220,13 +220,13 @@ def gives_way(scene: Scene, finger: LinearFinger, state: EquilibriumState) -> bo
     return harder.load.depth < state.load.depth
 
 
-def in_tissue(scene: Scene, finger: LinearFinger, depth: float) -> None:
+def refuse_beyond_tissue(scene: Scene, finger: LinearFinger, depth: float) -> None:
     """Raise SolveFailure where a given force leads to a meaningless `depth` [mm], as beyond the bone."""
     room, most = scene.finger.bone_depth(), None
     if depth >= room:
         with suppress(ContactLost):
             most = float(full_slip(finger.newton, sliding_load(scene)._replace(depth=room)).force[1])
-    within_reach(scene, depth, most)
+    check_depth(scene, depth, most)
 
 
 def remove_round_off(
@@ -248,7 +248,7 @@ def remove_round_off(
     return replace(correction, u=state.u + correction.u, iterations=state.iterations), recover(correction.u)
 
 
-def nearest(scene: Scene, finger: LinearFinger) -> EquilibriumState:
+def nearest_state(scene: Scene, finger: LinearFinger) -> EquilibriumState:
     """Return the settled state, or full slip where the friction limit of this mesh lies just below the given drag.
 
     Where no first guess converges, as for large coefficients, the state is followed from mu = 0. Raises as
@@ -269,7 +269,7 @@ def nearest(scene: Scene, finger: LinearFinger) -> EquilibriumState:
         return state
 
 
-def direct(scene: Scene, finger: LinearFinger, times: float = 1.0) -> EquilibriumState:
+def proven_state(scene: Scene, finger: LinearFinger, times: float = 1.0) -> EquilibriumState:
     """Return the settled state, a path-dependent one after `times` the usual load steps.
 
     Near or beyond a limit, guesses can converge to states to which no slide leads. Where none was found, or a folded
@@ -359,7 +359,7 @@ def expected_depth(scene: Scene) -> float:
     return max(state.load.depth, COVERED * highest, SHALLOW)
 
 
-def within_reach(scene: Scene, depth: float, most: float | None = None) -> None:
+def check_depth(scene: Scene, depth: float, most: float | None = None) -> None:
     """Raise SolveFailure where a given force leads to a `depth` [mm] outside the tissue.
 
     `most` is the normal force [N/mm] at the depth of the bone, where known.

@@ -10,10 +10,10 @@ from solver.accuracy.adaptivity import choose_steps, steps_of_press, with_shares
 from solver.accuracy.convergence_order import order_of
 from solver.accuracy.error_estimate import NO_NESTED_STATE, NestedState, Steps, edge_changes, nested_state
 from solver.arrays import Array
-from solver.continuation.existence import doubts, refuse_far_beyond
-from solver.continuation.finite_states import nearby, roughly, settled_state
-from solver.continuation.limit_point import is_folded, sound
-from solver.continuation.small_states import within_reach
+from solver.continuation.existence import limit_warnings, refuse_far_beyond
+from solver.continuation.finite_states import rough_state, settled_state, slide_near
+from solver.continuation.limit_point import is_folded, is_sound
+from solver.continuation.small_states import check_depth
 from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import end, march
@@ -120,7 +120,7 @@ def coarse_solution(scene: Scene, guess: float, fineness: float | Lines, meshes:
         if coarse.state.reaches_end:
             sizing = replace(sizing, margin=WIDER)
             coarse = meshes.coarse(scene, sizing)
-        if sound(coarse.finger, coarse.state):
+        if is_sound(coarse.finger, coarse.state):
             return coarse
         beyond_limit = is_folded(coarse.finger, coarse.state)
     except NoSteadyState:
@@ -155,9 +155,9 @@ def _on_coarse(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None
     """Return the state on the coarse mesh, or full slip where a given drag is close to the friction limit there."""
     drag = scene.tangential_force
     if drag is None:
-        return roughly(finger, scene, near)
+        return rough_state(finger, scene, near)
     try:
-        slide = roughly(finger, scene.without_drag(), near)
+        slide = rough_state(finger, scene.without_drag(), near)
     except SolveFailure:
         return march(scene, finger).last  # the drag may be met before sliding would fold the skin
     return slide if drag >= NEAR_SLIDE * abs(slide.force[0]) else march(scene, finger).last
@@ -210,7 +210,7 @@ def solve_nested(
             state = end(scene, finger)
         else:
             steps = None
-            state = nearby(finger, scene, start.state) or settled_state(finger, scene, start.state)
+            state = slide_near(finger, scene, start.state) or settled_state(finger, scene, start.state)
         order = order_of(finger, state)
     except CutFolds as failure:
         return failure, steps
@@ -271,7 +271,7 @@ def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float)
         state = path.last
     if not state.touching.any():
         raise NotConverged(f"No contact was found at {state.load.depth:g} mm of indentation: ask for more depth.")
-    within_reach(scene, state.load.depth)
+    check_depth(scene, state.load.depth)
     newton = finger.newton if path is None else path.newton
     # Under a light touch, errors of displacements far below a nanometre leave a large part of the forces unbalanced.
     checks = _audits(finger, newton, state)
@@ -287,7 +287,7 @@ def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float)
     row = finger.row.average(state.u)
     estimate_s = perf_counter() - solved_at
     wall = solved_at - start - setup
-    solution = replace(solution, steps=steps, warnings=doubts(finger, state), wall_s=wall, setup_s=setup)
+    solution = replace(solution, steps=steps, warnings=limit_warnings(finger, state), wall_s=wall, setup_s=setup)
     return prediction(solution, finger, numbers, row, nested_numbers, estimate_s)
 
 

@@ -20,7 +20,7 @@ from solver.body import Patches
 from solver.body.finite import IMAGINARY
 from solver.contact import STATE_NAMES, ForceLoad, LoadState
 from solver.continuation import jumped_branch
-from solver.continuation.limit_point import sound
+from solver.continuation.limit_point import is_sound
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, Newton, Termination, load_arguments
 from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger
 from solver.equilibrium.load_stepping import slide_from_guess, sliding_load, solve_full_slip, solve_under_forces
@@ -188,7 +188,7 @@ class Nearby:
         if not isinstance(self.finger, FiniteFinger):
             return True
         beyond = near.load.mu > self.state.load.mu or near.load.depth > self.state.load.depth
-        if beyond and not sound(self.finger, near):  # the skin may have folded
+        if beyond and not is_sound(self.finger, near):  # the skin may have folded
             return False
         return not jumped_branch(self.finger, self.state, near)
 

@@ -15,9 +15,9 @@ from solver.body import Patches
 from solver.body.finite import FiniteBody, FinitePatches
 from solver.body.linear import Elastic, LinearPatches
 from solver.body.receptor import endings
-from solver.continuation.finite_states import roughly
-from solver.continuation.limit_point import sound
-from solver.continuation.small_states import WIDE, direct, expected_depth, nearest
+from solver.continuation.finite_states import rough_state
+from solver.continuation.limit_point import is_sound
+from solver.continuation.small_states import WIDE, expected_depth, nearest_state, proven_state
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger, finite_laws, settled_moduli
 from solver.equilibrium.load_path import end
@@ -88,7 +88,7 @@ def _solve_nested(prediction: Prediction, sizing: Sizing) -> tuple[Finger[Any], 
     scene, meshes = prediction.scene, Meshes()
     if scene.solve.kinematics == "small":
         finger = LinearFinger.of(scene, sizing)
-        return finger, nearest(scene, finger), LinearFinger.on(scene, prediction.geometry)
+        return finger, nearest_state(scene, finger), LinearFinger.on(scene, prediction.geometry)
     low = coarse_solution(scene, expected_depth(scene), sizing.fineness, meshes)
     top = solution_on(scene, sizing, low, meshes)
     return top.finger, top.state, low.finger
@@ -138,12 +138,12 @@ def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> 
 def _rough_state(finger: Finger[Any], scene: Scene, near: EquilibriumState | None) -> EquilibriumState:
     """Return the settled slide, at finite strain sought from `near`. Raises SolveFailure, also where it is unsound."""
     if isinstance(finger, FiniteFinger):
-        state = roughly(finger, scene, near)
-        is_sound = sound(finger, state)
+        state = rough_state(finger, scene, near)
+        usable = is_sound(finger, state)
     else:
         assert isinstance(finger, LinearFinger)
-        state = direct(scene, finger)
-        is_sound = not finger.reaches_out(state, finger.displacement(state), state.load.depth)
-    if is_sound:
+        state = proven_state(scene, finger)
+        usable = not finger.reaches_out(state, finger.displacement(state), state.load.depth)
+    if usable:
         return state
     raise NotConverged("no sound state was found")

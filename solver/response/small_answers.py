@@ -15,7 +15,14 @@ from solver.accuracy.adaptivity import choose_steps, steps_of_press, with_shares
 from solver.accuracy.convergence_order import order_of
 from solver.accuracy.error_estimate import NO_NESTED_STATE, Steps, edge_changes, nested_state
 from solver.arrays import Array
-from solver.continuation.small_states import WIDE, direct, gives_way, in_tissue, nearest, remove_round_off
+from solver.continuation.small_states import (
+    WIDE,
+    gives_way,
+    nearest_state,
+    proven_state,
+    refuse_beyond_tissue,
+    remove_round_off,
+)
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import end, march
@@ -114,15 +121,15 @@ class SmallMeshing(Meshing):
         start = perf_counter()
         history = scene.solve.course == "history"
         for leg in scene.earlier_slides() if history else ():
-            direct(leg, finger)
-        steady = direct(scene, finger)
+            proven_state(leg, finger)
+        steady = proven_state(scene, finger)
         try:
             steps = choose_steps(scene, finger, settled=steady)
             times = steps_of_press(scene, finger) if steps is None else steps.times
         except SolveFailure:
             steps, times = Steps(1, np.zeros(COUNT), np.zeros(COUNT)), 1  # there will be no estimate either
         if times > 1 and steps is not None:
-            steady = direct(scene, finger, times)
+            steady = proven_state(scene, finger, times)
         path, state, relaxing = None, steady, history and scene.materials.relax
         if history:
             progress = self.progress
@@ -135,7 +142,7 @@ class SmallMeshing(Meshing):
             if relaxing:
                 state = replace(state, u=finger.body.condensed.displacement_under(state.reaction))
         displacement = finger.displacement(state)
-        in_tissue(scene, finger, state.load.depth)
+        refuse_beyond_tissue(scene, finger, state.load.depth)
         if finger.reaches_out(state, displacement, state.load.depth):
             return None
         direct_solve = path is None and scene.normal_force is None and not state.load.path_dependent
@@ -192,7 +199,9 @@ def nested_numbers_of_all(
     states: dict[int, EquilibriumState] = {}
     for number, solution in enumerate(solutions):
         try:
-            states[number] = nearest(solution.scene, mesh) if solution.steps is None else end(solution.scene, mesh)
+            states[number] = (
+                nearest_state(solution.scene, mesh) if solution.steps is None else end(solution.scene, mesh)
+            )
         except SolveFailure:
             continue
     out: list[NestedNumbers | NotConverged] = [NO_NESTED_STATE] * len(solutions)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver._kernels.contact_system import STEEP
+from solver._kernels.contact_system import SHEAR_LIMITED_MU
 from solver.accuracy.adaptivity import refine_lines
 from solver.accuracy.convergence_order import trial_warnings
 from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error
@@ -278,7 +278,7 @@ def _fall_back(scenes: list[Scene], answers: dict[int, Answer], meshing: Meshing
             answer = meshing.answers([scene], FIRST_FINENESS / FINENESS_RATIO)[0]
             if _coarser_counts(answer, failure):
                 answers[i], failures[i] = answer, failure
-        if isinstance(answers[i], NotConverged) and scene.friction.mu > STEEP:
+        if isinstance(answers[i], NotConverged) and scene.friction.mu > SHEAR_LIMITED_MU:
             answers[i] = meshing.answers([scene], FIRST_FINENESS * FINENESS_RATIO)[0]
     return failures
 

@@ -11,8 +11,8 @@ import numpy as np
 from solver.arrays import Array
 from solver.body.linear import LinearBody
 from solver.contact import LoadState
-from solver.continuation.existence import steady
-from solver.continuation.finite_states import roughly
+from solver.continuation.existence import proven_slide
+from solver.continuation.finite_states import rough_state
 from solver.continuation.small_states import settled_state
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, settled_moduli
@@ -100,8 +100,8 @@ class FiniteMethod(MeshMethod[FiniteFinger]):
         """Solve from the coarse mesh, or from `before`."""
         if before is None:
             with suppress(SolveFailure):  # with steep friction the skin may fold on the coarse mesh alone
-                before = self.finger.transfer(roughly(self._coarse, scene), self._coarse)
-        return steady(self.finger, sliding_load(scene), start=before)
+                before = self.finger.transfer(rough_state(self._coarse, scene), self._coarse)
+        return proven_slide(self.finger, sliding_load(scene), start=before)
 
     def floor(self) -> float:
         """Time one assembly, factorisation and solve."""

@@ -8,7 +8,7 @@ import pytest
 from solver import Finger, Friction, Loading, Material, Materials, Receptor, Relaxation, Scene, Solve, solve
 from solver.accuracy.convergence_order import trial_warnings
 from solver.accuracy.error_estimate import errors
-from solver.continuation.small_states import expected_depth, nearest, settled_state
+from solver.continuation.small_states import expected_depth, nearest_state, settled_state
 from solver.equilibrium import EQUILIBRIUM
 from solver.equilibrium.finger import LinearFinger
 from solver.mesh.mesher import Sizing
@@ -102,7 +102,7 @@ def test_the_sed_follows_an_edge_of_contact_by_a_parabola_about_a_place_within_h
     for number in range(40, 52):
         sample = random_scene("axis", number, "small")
         finger = LinearFinger.of(sample, Sizing(8.0, expected_depth(sample), margin=4.0))
-        state, newton = nearest(sample, finger), finger.newton
+        state, newton = nearest_state(sample, finger), finger.newton
         x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
         newton.linearise(state, state.load, x, 0, None)
 

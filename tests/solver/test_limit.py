@@ -37,7 +37,7 @@ def squeezed_scene(depth, angle, tissues):
     [pytest.param(1.0, 0.987, marks=SLOW), (1.5, 0.609), (2.0, 0.373), pytest.param(2.5, 0.233, marks=SLOW)],
 )
 def test_friction_has_the_limit_that_several_meshes_and_orders_of_another_code_found(depth, largest):
-    reach = limit_point.of_friction(
+    reach = limit_point.reach_in_friction(
         Scene(friction=Friction(0.0), loading=Loading(depth)), LoadState(depth, 0.0, np.inf, TOWARDS_TIP), 2.0
     )
     assert reach.limited
@@ -55,7 +55,7 @@ def test_friction_has_the_limit_that_several_meshes_and_orders_of_another_code_f
 )
 def test_depth_has_the_limit_that_another_code_found(mu, tau, largest):
     scene = Scene(friction=Friction(mu), loading=Loading(2.0))
-    reach = limit_point.of_depth(scene, LoadState(2.0, mu, tau, TOWARDS_TIP))
+    reach = limit_point.reach_in_depth(scene, LoadState(2.0, mu, tau, TOWARDS_TIP))
     assert reach.limited
     assert reach.value == pytest.approx(largest, rel=0.03)
 
@@ -67,13 +67,13 @@ def test_where_skin_folds_at_one_place_both_limits_are_those_of_a_mesh_of_half_t
 ):
     scene = squeezed_scene(depth, angle, tissues)
     load = LoadState(depth, 0.85, np.inf, TOWARDS_TIP)
-    mu, deepest = limit_point.of_friction(scene, load, 2.0), limit_point.of_depth(scene, load)
+    mu, deepest = limit_point.reach_in_friction(scene, load, 2.0), limit_point.reach_in_depth(scene, load)
     monkeypatch.setattr(limit_point, "FINENESS", 2.0 * limit_point.FINENESS)
     monkeypatch.setattr(mesher, "FOLD", tuple(size / 2.0 for size in mesher.FOLD))
     finer = squeezed_scene(depth + 1e-9, angle, tissues)  # what was answered is not asked again
     load = load._replace(depth=depth + 1e-9)
-    assert mu.value == pytest.approx(limit_point.of_friction(finer, load, 2.0).value, rel=0.015)
-    assert deepest.value == pytest.approx(limit_point.of_depth(finer, load).value, rel=0.01)
+    assert mu.value == pytest.approx(limit_point.reach_in_friction(finer, load, 2.0).value, rel=0.015)
+    assert deepest.value == pytest.approx(limit_point.reach_in_depth(finer, load).value, rel=0.01)
 
 
 def test_a_branch_that_reaches_what_was_asked_for_is_the_direct_answer():
@@ -92,7 +92,7 @@ def test_a_branch_that_reaches_what_was_asked_for_is_the_direct_answer():
 def test_every_friction_beyond_the_end_of_a_branch_has_the_same_limit():
     scene, load = Scene(friction=Friction(0.0), loading=Loading(2.2)), LoadState(2.2, 0.0, np.inf, TOWARDS_TIP)
     targets = (1.1, 0.33, 0.7)  # in pieces of the branch that are traced one after another
-    assert len({limit_point.of_friction(scene, load, target).value for target in targets}) == 1
+    assert len({limit_point.reach_in_friction(scene, load, target).value for target in targets}) == 1
 
 
 @pytest.mark.parametrize("exponent", [None, 2.0])
@@ -147,11 +147,11 @@ def test_no_limit_of_friction_is_told_where_growing_depth_arrives_beyond_it(monk
         return replace(branch_end, value=1.5, limited=target.mu == load.mu)
 
     monkeypatch.setattr(existence, "_direct_states", lambda *_: iter(()))
-    monkeypatch.setattr(existence, "of_friction", lambda *_: branch_end)
-    monkeypatch.setattr(existence, "of_depth", by_depth)
+    monkeypatch.setattr(existence, "reach_in_friction", lambda *_: branch_end)
+    monkeypatch.setattr(existence, "reach_in_depth", by_depth)
     with pytest.raises(NotConverged, match=r"followed up to mu = 0\.373 and lost there"):
-        existence.steady(FiniteFinger.of(scene, mesher.Sizing(5.0, 2.0)), load)
-    monkeypatch.setattr(existence, "of_depth", lambda *_: replace(branch_end, value=1.5))
+        existence.proven_slide(FiniteFinger.of(scene, mesher.Sizing(5.0, 2.0)), load)
+    monkeypatch.setattr(existence, "reach_in_depth", lambda *_: replace(branch_end, value=1.5))
     with pytest.raises(NoSteadyState) as refusal:
-        existence.steady(FiniteFinger.of(scene, mesher.Sizing(5.0, 2.0)), load)
+        existence.proven_slide(FiniteFinger.of(scene, mesher.Sizing(5.0, 2.0)), load)
     assert (refusal.value.limit_mu, refusal.value.limit_indentation) == (0.373, 1.5)

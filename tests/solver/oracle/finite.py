@@ -5,7 +5,7 @@ from typing import cast
 
 import numpy as np
 
-from solver._kernels.contact_system import STEEP
+from solver._kernels.contact_system import SHEAR_LIMITED_MU
 from solver.arrays import Array, Indices
 from solver.body.finite import FiniteBody
 from solver.constitutive import shape, slopes
@@ -173,7 +173,7 @@ def update_contact_states(
         entering = SLIP if frictionless(law) else STICK
     else:
         new_sense = np.where(is_open | (push < -slack), sense, direction)
-        entering = SHEAR_LIMITED if law.mu > STEEP and law.tau_max < np.inf else SLIP
+        entering = SHEAR_LIMITED if law.mu > SHEAR_LIMITED_MU and law.tau_max < np.inf else SLIP
         new_sense = np.where(is_open & (above < -small), direction, new_sense)
     new_state = np.where(push < -slack, OPEN, new_state)
     new_state = np.where(is_open, np.where(above < -small, entering, OPEN), new_state)
