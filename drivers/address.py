@@ -26,6 +26,7 @@ class Address:
     uri: str  # as typed
     scheme: str  # the driver's name, e.g. "net-ft"
     host: str
+    path: str
     options: Mapping[str, str]
 
     def number(self, option: str, default: int, lowest: int, highest: int) -> int:
@@ -79,7 +80,7 @@ def parse_address(uri: str) -> Address:
     options = dict(pairs)
     if len(options) < len(pairs):
         raise AddressError(f"{uri} gives an option twice; give each once")
-    return Address(uri, parts.scheme, parts.hostname or "", options)
+    return Address(uri, parts.scheme, parts.hostname or "", parts.path.removesuffix("/"), options)
 
 
 @contextmanager
@@ -91,8 +92,20 @@ def prefix_failures(address: Address) -> Generator[None]:
         raise type(error)(f"{address.uri}: {error}") from None
 
 
-def check_options(address: Address, option_names: frozenset[str]) -> None:
-    """Raise SetupError when the address has an option that is not in `option_names`."""
+def check_form(address: Address, example: str, option_names: frozenset[str]) -> None:
+    """Raise AddressError unless the address has the parts of an example, and no option that is not in `option_names`.
+
+    Where the example has a path, host and path are one name, and whoever opens what it names checks it.
+    """
+    form = parse_address(example)
+    for part in () if form.path else ("host", "path"):
+        text = getattr(address, part)
+        if text and not getattr(form, part):
+            raise AddressError(
+                f"{address.uri}: a {address.scheme} address has no {part} ({text}); write for example {example}"
+            )
+        if not text and getattr(form, part):
+            raise AddressError(f"{address.uri} names no {part}; write for example {example}")
     for option in address.options:
         if option not in option_names:
             names = ", ".join(sorted(option_names | {"tool"}))  # which every transducer takes, see `without_tool`

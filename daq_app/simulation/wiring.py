@@ -5,7 +5,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from drivers.address import check_options, parse_address, without_tool
+from drivers.address import check_form, parse_address, without_tool
 from drivers.catalog import open_transducer
 from drivers.clock import Clock
 from drivers.transducer import Transducer
@@ -73,7 +73,7 @@ def connect(uri: str, clock: Clock) -> Generator[Connection]:
         with closing(open_transducer(uri, clock)) as transducer:
             yield Connection(transducer)
         return
-    check_options(address, _OPTIONS)
+    check_form(address, "sim:?seed=7&rate=200", _OPTIONS)
     without_tool(address)  # refused in terms of this address
     bench = Bench(address.number("seed", 0, 0, 2**31 - 1))
     box = NetFtBox(bench, clock, rate=address.number("rate", 200, 1, 7000))

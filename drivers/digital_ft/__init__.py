@@ -7,7 +7,7 @@ import time
 from dataclasses import dataclass
 from functools import partial
 
-from drivers.address import Address, Driver, check_options, prefix_failures
+from drivers.address import Address, Driver, check_form, prefix_failures
 from drivers.clock import Clock
 from drivers.clock_recovery import GAP, ClockRecovery
 from drivers.deadline import Deadline, Link
@@ -106,7 +106,7 @@ def _info(target: _Target, calibration: wire.StoredCalibration, status: int | No
 
 
 def _target_of(address: Address) -> _Target:
-    check_options(address, _OPTIONS)
+    check_form(address, "digital-ft:///dev/ttyUSB0", _OPTIONS)
     return _Target(
         address,
         port_of(address),

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from drivers.address import Address, AddressError, Driver, check_options, prefix_failures
+from drivers.address import Address, AddressError, Driver, check_form, prefix_failures
 from drivers.calibration_file import CalibrationFile, read_calibration_file
 from drivers.clock import Clock
 from drivers.clock_recovery import ScanCount
@@ -118,9 +118,7 @@ def _info(
 
 
 def _target_of(address: Address) -> _Target:
-    check_options(address, _OPTIONS)
-    if address.host:
-        raise AddressError(f"{address.uri}: a USB device has no host; write labjack-u6://?serial=...&cal=FILE")
+    check_form(address, "labjack-u6://?serial=...&cal=FILE", _OPTIONS)
     file = address.options.get("cal")
     return _Target(
         address.uri,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivers.address import Address, AddressError, Driver, check_options
+from drivers.address import Address, Driver, check_form
 from drivers.clock import Clock
 from drivers.deadline import Deadline
 from drivers.links import UdpLink, http_get, resolve, tcp_answer
@@ -53,9 +53,7 @@ def identify_net_ft(address: Address, deadline: Deadline) -> TransducerInfo:
 
 
 def _target_of(address: Address, deadline: Deadline) -> _Target:
-    check_options(address, _OPTIONS)
-    if not address.host:
-        raise AddressError(f"{address.uri} names no host; write for example net-ft://192.168.1.1")
+    check_form(address, "net-ft://192.168.1.1", _OPTIONS)
     return _Target(
         address,
         http_port=address.number("http", 80, 1, 65535),

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from drivers.address import Address, AddressError, Driver, check_options
+from drivers.address import Address, AddressError, Driver, check_form
 from drivers.calibration_file import read_calibration_file
 from drivers.clock import Clock
 from drivers.clock_recovery import ScanCount
@@ -31,6 +31,7 @@ _STATUS_BITS = StatusTable(
 _BUFFER = 10.0  # readings that the library keeps for a computer that is late [s]
 _NAP = 0.005  # between two looks for readings [real s]
 _OPTIONS = frozenset({"cal", "rate"})
+_EXAMPLE = "nidaq://Dev1?cal=FILE"
 _DEFAULT_RATE = 1000  # [Hz]
 
 
@@ -48,7 +49,7 @@ def library() -> Any:  # noqa: ANN401 - it is not always there
 
 def open_nidaq(address: Address, clock: Clock, deadline: Deadline) -> StreamingTransducer:
     """Return the transducer at `address`, not streaming. Raises SetupError with the reason."""
-    check_options(address, _OPTIONS)
+    check_form(address, _EXAMPLE, _OPTIONS)
     api = library()
     device, info = _device_info(api, address)
     rate = address.number("rate", _DEFAULT_RATE, 1, 100_000)
@@ -65,15 +66,15 @@ def open_nidaq(address: Address, clock: Clock, deadline: Deadline) -> StreamingT
 
 def identify_nidaq(address: Address, _deadline: Deadline) -> TransducerInfo:
     """Return who is there; nothing is acquired. Raises SetupError with the reason."""
-    check_options(address, _OPTIONS)
+    check_form(address, _EXAMPLE, _OPTIONS)
     return _device_info(library(), address)[1]
 
 
 def _device_info(api: Any, address: Address) -> tuple[str, TransducerInfo]:  # noqa: ANN401
     """Return the device's name as NI-DAQmx spells it, and who the transducer on it is."""
     file = address.options.get("cal")
-    if not address.host or file is None:
-        raise AddressError(f"{address.uri}: write nidaq://Dev1?cal=FILE, with the transducer's own .cal file")
+    if file is None:
+        raise AddressError(f"{address.uri}: write {_EXAMPLE}, with the transducer's own .cal file")
     calibration = read_calibration_file(Path(file))
     try:
         devices = {device.name.lower(): device for device in api.system.System.local().devices}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.address import Address, AddressError, Driver, check_options, prefix_failures
+from drivers.address import Address, AddressError, Driver, check_form, prefix_failures
 from drivers.calibration import Calibration
 from drivers.clock import Clock
 from drivers.clock_recovery import GAP, ClockRecovery
@@ -110,7 +110,7 @@ def _info(target: _Target, baud: int, reply: str, rate: float) -> TransducerInfo
 
 
 def _target_of(address: Address) -> _Target:
-    check_options(address, _OPTIONS)
+    check_form(address, "serial-ft:///dev/ttyUSB0", _OPTIONS)
     port = port_of(address)
     form = address.word("format", ("binary", "ascii"))
     baud = address.number("baud", 0, 300, 921600)

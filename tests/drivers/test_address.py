@@ -1,12 +1,14 @@
 """Device addresses as people type them."""
 
 import contextlib
+import re
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.address import AddressError, check_options, parse_address
+from daq_app.simulation.wiring import connect
+from drivers.address import AddressError, check_form, parse_address
 from drivers.catalog import open_transducer
 from drivers.clock import RealClock
 from drivers.transducer import LinkLost, SetupError
@@ -58,7 +60,7 @@ def test_an_option_out_of_range_is_refused_by_name(value):
 
 def test_an_unknown_option_is_refused_with_those_that_are_allowed():
     with pytest.raises(SetupError, match=r"'port'.*http, rdt"):
-        check_options(parse_address("net-ft://h?port=1"), frozenset({"rdt", "http"}))
+        check_form(parse_address("net-ft://h?port=1"), "net-ft://h", frozenset({"rdt", "http"}))
 
 
 @given(st.one_of(st.text(max_size=30), st.text(max_size=20).map(lambda text: "net-ft://" + text)))
@@ -72,6 +74,11 @@ def test_any_text_is_an_address_or_refused_in_a_sentence(text):
     [
         ("usb://x", "no driver 'usb'"),
         ("net-ft://", "names no host"),
+        ("net-ft:192.168.1.1", "names no host; write for example net-ft://192.168.1.1"),
+        ("net-ft://192.168.1.1/netftapi2.xml", "has no path (/netftapi2.xml)"),
+        ("labjack-u6://foo?cal=a.cal", "has no host (foo); write for example labjack-u6://?serial=...&cal=FILE"),
+        ("labjack-u6:/foo?cal=a.cal", "has no path (/foo)"),
+        ("nidaq://Dev1/ai0?cal=a.cal", "has no path (/ai0); write for example nidaq://Dev1?cal=FILE"),
         ("net-ft://127.0.0.1?http=0", "http=0"),
         ("net-ft://127.0.0.1?rate=8000", "rate=8000"),
         ("net-ft://127.0.0.1?baud=1", "'baud'"),
@@ -85,8 +92,14 @@ def test_any_text_is_an_address_or_refused_in_a_sentence(text):
     ],
 )
 def test_an_address_that_cannot_be_opened_is_refused_in_a_sentence(uri, reason):
-    with pytest.raises(SetupError, match=reason):
+    with pytest.raises(SetupError, match=re.escape(reason)):
         open_transducer(uri, RealClock())
+
+
+@pytest.mark.parametrize("uri", ["sim://foo", "sim:foo", "sim:/foo?seed=7"])
+def test_a_simulated_bench_has_no_name(uri):
+    with pytest.raises(AddressError, match=r"foo\); write for example sim:\?seed="), connect(uri, RealClock()):
+        pass
 
 
 @pytest.mark.parametrize(
