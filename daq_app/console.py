@@ -238,6 +238,17 @@ def point_advice(text: str) -> str:
 class _Help(argparse.HelpFormatter):
     """Fills each paragraph of a text to the width of the terminal, but for those with indented lines."""
 
+    def format_help(self) -> str:
+        """Return the text; a usage line is broken between choices too, which argparse keeps on one line."""
+        return "\n".join(map(self._break_choices, super().format_help().split("\n")))
+
+    def _break_choices(self, line: str) -> str:
+        words = line.replace(" ", "\0").replace("\0|\0", "\0| ")  # a line breaks at a space alone
+        indent = " " * (len(line) - len(line.lstrip()) + 1)
+        wrapper = textwrap.TextWrapper(self._width, break_long_words=False, break_on_hyphens=False)
+        wrapper.subsequent_indent = indent
+        return wrapper.fill(words).replace("\0", " ")
+
     def _fill_text(self, text: str, width: int, indent: str) -> str:  # noqa: ARG002  argparse's own
         paragraphs = text.strip().split("\n\n")
         return "\n\n".join(one if "\n  " in one else textwrap.fill(one, width) for one in paragraphs)

@@ -23,6 +23,7 @@ from daq_app.qt.tables import TextTable
 from daq_app.qt.tokens import GRID
 from daq_app.wording import tr, tr_noop
 from sessions.file_access import write_whole
+from sessions.strokes.stroke import digits
 
 _FILE_FORMATS = ("SVG", "PNG", "CSV")
 Save = Callable[[str, str], object]  # name of a picture, and the path to write it to
@@ -123,10 +124,10 @@ class ComparedView(QWidget):
         for stimulus, pairs in rows:
             cells = [stimulus]
             for name, (first, second) in zip(MEAN_PANELS, pairs, strict=True):
-                digits = 1 if name == "score" else 3
+                places = 1 if name == "score" else 3
                 difference = None if first is None or second is None else second - first
                 means = (first, ""), (second, ""), (difference, "+")
-                cells += ["–" if mean is None else f"{mean:{sign}.{digits}f}".replace("-", "−") for mean, sign in means]
+                cells += ["–" if mean is None else digits(mean, places, sign) for mean, sign in means]
             lines.append(tuple(cells))
         self.table.show_lines(tuple(lines))
 

@@ -12,6 +12,7 @@ from drivers.arrays import Array, Indices, Mask
 from sessions.plan.plan import Frame, SessionPlan
 from sessions.strokes import FrictionParameters
 from sessions.strokes.forces import in_face_frame
+from sessions.strokes.stroke import digits
 
 Kinematics = Literal["small", "finite"]
 
@@ -185,7 +186,7 @@ def _settled_text(settled: SettledSolve) -> str:
         form = tr_noop("No full solve at {how}{shown}. {reason}{kept}")
         return tr(form, how=strain, shown=live, reason=settled.reason, kept=last_state)
     if (difference := settled.difference) is not None:
-        live += f" ({100 * difference:+.1f} %)".replace("-", "−")
+        live += f" ({digits(100 * difference, 1, '+')} %)"
     return tr(
         "Full solve  SED {kpa}{errors} · at the measured force, {how}{shown}",
         kpa=_kpa(settled.sed), errors=errors_text(settled.error, settled.effect), how=strain, shown=live,

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivers.arrays import Array
+from sessions.strokes.stroke import digits
 from solver import Friction, Loading, Scene, SceneError, Solve
 from solver.quantities import NAMES
 from solver.response.receptor_row import rough_responses
@@ -71,8 +72,8 @@ def other_signs(finger: Scene) -> list[str]:
     changes = {name: (float(slopes[name][0].change[_SED]), float(base_slopes[name][0].change[_SED])) for name in SERIES}
     return [
         f"On this finger the SED goes the other way with µ than on the published one, over its surfaces of {name}: by "
-        f"{100 * mine:+.0f} % and {100 * published:+.0f} % of the mean from the least to the greatest µ, at the "
-        "published depth. What the scores say of the model hangs on the finger that is assumed.".replace("-", "−")
+        f"{digits(100 * mine, 0, '+')} % and {digits(100 * published, 0, '+')} % of the mean from the least to the "
+        "greatest µ, at the published depth. What the scores say of the model hangs on the finger that is assumed."
         for name, (mine, published) in changes.items()
         if mine * published < 0.0
     ]

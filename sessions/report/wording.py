@@ -6,6 +6,7 @@ import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from sessions.prediction import BY_NAME, SED
 from sessions.prediction.stored import Ends
@@ -58,8 +59,8 @@ def finer(low: float, high: float, as_text: Callable[[float], str], unit: float 
     if as_text(low) != as_text(high) or low == high:
         return as_text
     decimals = max(0, -math.floor(math.log10(unit * abs(high - low))))
-    sign = "+" if as_text(1.0).startswith("+") else ""
-    return lambda value: f"{unit * value:{sign}.{decimals}f}".replace("-", "−")
+    sign: Literal["", "+"] = "+" if as_text(1.0).startswith("+") else ""
+    return lambda value: digits(unit * value, decimals, sign)
 
 
 def places(n: int) -> Callable[[float], str]:
@@ -79,7 +80,7 @@ def with_sign(value: float) -> str:
     """
     if abs(value) < 0.05:
         return "0.0"
-    return f"{value:+.1f}".replace("-", "−")
+    return digits(value, 1, "+")
 
 
 def sed(megapascal: float) -> str:
@@ -100,7 +101,7 @@ def correlation(r: float) -> str:
     """
     gap = 1.0 - abs(r)
     decimals = -math.floor(math.log10(gap)) if 1e-9 < gap <= 0.005 else 2
-    return f"{r:+z.{decimals}f}".replace("-", "−")
+    return digits(r, decimals, "+")
 
 
 def ends_of(relation: Relation) -> str:

@@ -17,13 +17,13 @@ from sessions.plan.plan import PROXIMAL_TO_DISTAL, Trial
 Interval = tuple[float, float]
 
 
-def digits(value: float, places: int) -> str:
-    """Return a number with so many decimals and a true minus sign.
+def digits(value: float, places: int, sign: Literal["", "+"] = "") -> str:
+    """Return a number with so many decimals and a true minus sign; with "+" positive ones have a sign too.
 
-    >>> digits(-0.25, 2)
-    '−0.25'
+    >>> digits(-0.25, 2), digits(0.25, 1, "+")
+    ('−0.25', '+0.2')
     """
-    return f"{value:z.{places}f}".replace("-", "−")
+    return f"{value:{sign}z.{places}f}".replace("-", "−")
 
 
 def significant(value: float, figures: int) -> str:

@@ -12,6 +12,7 @@ from daq_app.batch.derived import analyse_session, open_visit, predict_session
 from daq_app.cli.options import add_analysis, add_flag, add_number, add_shared, add_visit, area_law, numbers_by_key
 from daq_app.console import DONE, FLAWED, Console, WrongValue, table
 from daq_app.wording import number
+from sessions.plan.protocols.protocol import DEEPEST_INDENTATION, INDENTATIONS
 from sessions.prediction import BY_NAME, SED, PredictionOptions, SessionPrediction, TrialPrediction, finger_in
 from sessions.prediction.afferent import AfferentSettings, firing_document, session_firing, settings_with
 from sessions.prediction.sealed_predictions import SEAL, seal_prediction
@@ -37,10 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     meaning = "scene file with another finger; friction and loading are the trials'"
     parser.add_argument("--scene", type=Path, metavar="FILE", help=meaning)
-    span = (1e-6, 10.0)  # as a block's
-    add_number(
-        parser, "--indentation", float, span, "instead of each block's own", None, "MM", "above 0, up to 10 (mm)"
-    )
+    span = (math.ulp(0.0), DEEPEST_INDENTATION)
+    add_number(parser, "--indentation", float, span, "instead of each block's own", None, "MM", INDENTATIONS)
     add_flag(parser, "--intervals", "also what the uncertainty of friction makes of each SED (more solves)")
     meaning = "also firing rates and spike times of an SA-II afferent that answers to that quantity: an illustration"
     add_flag(parser, "--afferent", meaning)

@@ -35,7 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     device.add_argument("--scores-only", action="store_true", help="a visit without a transducer")
     parser.add_argument("--subject", required=True, metavar="CODE", help="a code, never a name")
     parser.add_argument("--seed", type=int, help="of the stimulus order (a new one, recorded, unless given)")
-    parser.add_argument("--phases", nargs="+", choices=get_args(Phase), help="of the visit (the protocol's own)")
+    phases, meaning = get_args(Phase), f"of the visit, of {', '.join(get_args(Phase))} (the protocol's own)"
+    parser.add_argument("--phases", nargs="+", choices=phases, metavar="PHASE", help=meaning)
     add_body_arguments(parser)
     height = "of the stimulus's face above the sensor's origin"
     add_shared(parser, "headless", simulate_subject="simulated people", height=height)

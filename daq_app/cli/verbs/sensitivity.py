@@ -196,7 +196,7 @@ def _cells(answer: Answer | str, series: str, column: int) -> tuple[str, str]:
     with_index, change = (statistic[0][column] for statistic in answer[series])
     if with_index is None or change is None:
         return "no slide", "–"
-    return correlation(with_index), f"{100 * change:+.0f} %".replace("-", "−")
+    return correlation(with_index), f"{digits(100 * change, 0, '+')} %"
 
 
 def _print_map(radii: dict[float, Answer | str], column: int, console: Console) -> None:
@@ -208,7 +208,7 @@ def _print_map(radii: dict[float, Answer | str], column: int, console: Console) 
         [f"{radius:g}", *(_mark(answer, position, column) for position in range(len(sign_map.PLACES)))]
         for radius, answer in radii.items()
     ]
-    console.say(table(rows, header=["", *(f"{position:g}".replace("-", "−") for position in sign_map.PLACES)]))
+    console.say(table(rows, header=["", *(digits(position, 2) for position in sign_map.PLACES)]))
 
 
 def _mark(answer: Answer | str, position: int, column: int) -> str:

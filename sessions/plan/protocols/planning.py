@@ -19,7 +19,7 @@ from sessions.plan.plan import (
     Stimulus,
     Trial,
 )
-from sessions.plan.protocols.protocol import LARGEST_SEED, BlockOutline, Labels, Protocol, check_phases
+from sessions.plan.protocols.protocol import LARGEST_SEED, BlockOutline, Labels, Protocol, check_depth, check_phases
 from sessions.toml_file import SettingsError, check, check_range
 
 DIRECTIONS = {"proximal to distal": PROXIMAL_TO_DISTAL, "distal to proximal": DISTAL_TO_PROXIMAL}
@@ -155,7 +155,7 @@ def check_body(body: Body, protocol: Protocol) -> None:
     names = [block.name for block in protocol.blocks]
     for name, depth in body.indentations.items():
         check(name in names, "depth", name, f"there is no such block; {protocol.name} has {', '.join(names)}")
-        check(0 < depth <= 10, f"depth of {name}", depth, "it must lie above 0 and up to 10 mm")
+        check_depth(f"depth of {name}", depth)
 
 
 @dataclass(eq=False)

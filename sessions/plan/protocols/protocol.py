@@ -30,6 +30,13 @@ LEAST_COMPARISONS = 3  # with a standard: two fit any point of subjective equali
 Labels = dict[tuple[str, int], str]  # descriptor and index of a stimulus -> the code on its back
 PRE_EVALUATION = "pre-evaluation"  # the name under which the instruction of that phase is translated
 ENGLISH = "en"
+DEEPEST_INDENTATION = 10  # press of the model's finger [mm]
+INDENTATIONS = f"above 0, up to {DEEPEST_INDENTATION} mm"
+
+
+def check_depth(key: str, depth: float) -> None:
+    """Raise NotAllowed for a depth that the model does not press the finger to [mm]."""
+    check(0 < depth <= DEEPEST_INDENTATION, key, depth, f"it must lie {INDENTATIONS}")
 
 
 class BlockOutline(msgspec.Struct, frozen=True):
@@ -54,7 +61,7 @@ class BlockOutline(msgspec.Struct, frozen=True):
         """Check ranges."""
         for name in ("name", "descriptor", "instruction"):
             check_text(name, getattr(self, name))
-        check(0 < self.indentation <= 10, "indentation", self.indentation, "it must lie above 0 and up to 10 mm")
+        check_depth("indentation", self.indentation)
         indices, distinct = list(self.indices), 0 < len(self.indices) == len(set(self.indices))
         check(distinct, "indices", indices, "there must be at least one, and none may come twice")
         check(all(0 <= index <= 100 for index in indices), "indices", indices, "each must lie between 0 and 100")
