@@ -29,6 +29,9 @@ class NotNow(Exception):
     """What was asked for is not possible now; the message says why and what to do."""
 
 
+_FAILURES = (LinkLost, DeviceFault, SetupError, RecordingError, NotNow)
+
+
 @contextmanager
 def _breakable(uri: str) -> Generator[None]:
     """Let a stop break off what waits for a device, which may take its time. Raises NotNow when one did."""
@@ -98,6 +101,30 @@ class Bench:
             raise
         assert self.connected is not None
         self._send(Device(self.connected.transducer.info, self.connected.frame))
+
+    @contextmanager
+    def instead(self, uri: str) -> Generator[None]:
+        """Have the transducer at `uri` open inside; what goes wrong there, or in opening it, gives the former one back.
+
+        One in another place is let go of when that at `uri` has answered. Raises what goes wrong.
+        """
+        former = self.uri if self.connected is not None else None
+        try:
+            if uri != former:
+                if former is not None and uri.partition("?")[0] != former.partition("?")[0]:
+                    with _breakable(uri), connect(uri, self._clock):
+                        pass
+                self.connect(uri, streaming=False)
+            yield
+        except _FAILURES as error:
+            if former is None or self.uri == former:
+                raise
+            try:
+                self.connect(former)
+                outcome = "is connected again"
+            except _FAILURES as failure:
+                outcome = f"was let go of and does not come back: {failure}"
+            raise type(error)(f"{error}; {former} {outcome}") from None
 
     def disconnect(self) -> None:
         """Close the transducer."""

@@ -144,11 +144,11 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> SessionSetup
     people = _recorded_people(recording)
     if request.people is not None:  # the bench holds the surfaces that it held
         people = replace(request.people, friction=people.friction)
-    info = _reopen(request, recording, bench)
-    _check_people(people, recording.plan, bench, folder)
-    if simulated_sentence(info, people.kind != "people") != recording.simulated_sentence:
-        raise NotNow("what was simulated at the beginning must be simulated again, and nothing else")
-    writer = SessionWriter.open(folder, going_on, reserve=RESERVE)
+    with _own_transducer(request, recording, bench) as info:
+        _check_people(people, recording.plan, bench, folder)
+        if simulated_sentence(info, people.kind != "people") != recording.simulated_sentence:
+            raise NotNow("what was simulated at the beginning must be simulated again, and nothing else")
+        writer = SessionWriter.open(folder, going_on, reserve=RESERVE)
     continuation = Continuation(resumption, resuming.resumed_data(gap, info, software_versions()), last)
     return SessionSetup(
         recording.plan, writer, going_on, people, info, going_on.offset_ns, continuation, tuple(recording.events)
@@ -314,16 +314,18 @@ def _folder_settings(folder: Path, *, any_folder: bool) -> list[Setting]:
     return [Setting(ANY_FOLDER, sentence.partition(";")[0].replace(str(folder.resolve()), "the folder"), "", "set")]
 
 
-def _reopen(request: m.ResumeSession, recording: Recording, bench: Bench) -> TransducerInfo | None:
-    """Reopen the transducer of the session, and return who it is; None for a visit that only scores."""
+@contextmanager
+def _own_transducer(request: m.ResumeSession, recording: Recording, bench: Bench) -> Generator[TransducerInfo | None]:
+    """Have the transducer of the session open, and return who it is; None for a visit that only scores."""
     if recording.info is None:
         if request.uri is not None:
             raise NotNow("the session began without a transducer, and goes on without one")
-        return None
-    bench.connect(request.uri or _recorded_settings(recording).get("device") or recording.info.uri, streaming=False)
-    info = _transducer_info(bench)
-    resuming.check_same_transducer(recording.info, info)
-    return info
+        yield None
+        return
+    with bench.instead(request.uri or _recorded_settings(recording).get("device") or recording.info.uri):
+        info = _transducer_info(bench)
+        resuming.check_same_transducer(recording.info, info)
+        yield info
 
 
 def _transducer_info(bench: Bench) -> TransducerInfo:

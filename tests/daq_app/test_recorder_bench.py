@@ -6,10 +6,11 @@ from session_messages import INFO
 
 from daq_app.recorder.bench import Bench
 from daq_app.recorder.display import Display
-from daq_app.recorder.messages import Failed, HealthReport, LinkBack, LinkDown, Live, Tared
+from daq_app.recorder.messages import Failed, HealthReport, LinkBack, LinkDown, Live, NoDevice, Tared
 from drivers.clock import RealClock
 from drivers.readings import ReadingBlock
-from drivers.transducer import Health, SetupError
+from drivers.transducer import Health, LinkLost, SetupError
+from sessions.recording import RecordingError
 
 
 class Seat:
@@ -45,6 +46,40 @@ def test_a_tare_that_a_session_or_a_lost_transducer_ends_is_reported(seat):
     seat.bench.lose("the cable is out")
     words = [report.sentence.partition(": ")[2] for report in seat.reports if isinstance(report, Failed)]
     assert words == ["a session began; zero again after it", "the transducer is no longer connected"]
+
+
+def test_a_transducer_at_the_address_that_is_asked_for_stays_connected(seat):
+    connected = seat.bench.connected
+    with seat.bench.instead("sim:?seed=7"):
+        assert seat.bench.connected is connected
+    assert not any(isinstance(report, NoDevice) for report in seat.reports)
+
+
+def test_a_transducer_in_another_place_that_does_not_answer_leaves_the_connected_one_alone(seat):
+    connected = seat.bench.connected
+    with pytest.raises(LinkLost, match="nothing answers"), seat.bench.instead("net-ft://127.0.0.1?http=1"):
+        pass
+    assert seat.bench.connected is connected
+    assert seat.until(Live)
+
+
+def test_a_transducer_that_turns_out_to_be_the_wrong_one_gives_back_the_former(seat):
+    def compare():
+        assert seat.bench.uri == "sim:?seed=8&rate=100"
+        raise RecordingError("another one")
+
+    again = r"another one; sim:\?seed=7 is connected again$"
+    with pytest.raises(RecordingError, match=again), seat.bench.instead("sim:?seed=8&rate=100"):
+        compare()
+    assert seat.bench.uri == "sim:?seed=7"
+    assert seat.until(Live)
+
+
+def test_a_transducer_that_does_not_open_in_the_place_of_the_connected_one_gives_it_back(seat):
+    again = r"rate=9000.*; sim:\?seed=7 is connected again$"
+    with pytest.raises(SetupError, match=again), seat.bench.instead("sim:?rate=9000"):
+        pass
+    assert seat.until(Live)
 
 
 def test_a_transducer_that_refuses_to_stream_after_a_session_is_lost_and_tried_again(seat, monkeypatch):
