@@ -111,6 +111,15 @@ def number(value: float | None, digits: int = 3, *, factor: float = 1.0) -> str:
     return f"−{text}" if value < 0.0 else text
 
 
+def aligned(count: int) -> str:
+    r"""Return a number of a row, as wide as one of two figures.
+
+    >>> aligned(3), aligned(12)
+    ('\u20073', '12')
+    """
+    return f"{count:\u2007>2}"
+
+
 def typed_number(text: str, point: str = ".") -> float | None:
     """Return the number that somebody typed, in digits of any script; None where it is no plain one.
 

@@ -53,6 +53,8 @@ def finger_text(state: AnalystState) -> str:
     prediction = row.prediction
     name = tr("stroke") if row.trial is None else tr("trial {trial}", trial=row.trial)
     if prediction is None:
+        if row.stroke is None:
+            return tr("No finger: {name} has no stroke.", name=name)
         if state.halted:
             return tr("The finger of {name} was not solved: the work was stopped. 'Go on' solves it.", name=name)
         return tr("The finger of {name} is being solved.", name=name)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from daq_app.analyst.state import AnalystState, Row, Step, rows, selected_row
-from daq_app.wording import answer_text, errors_text, quantity, tr, tr_noop
+from daq_app.wording import aligned, answer_text, errors_text, quantity, tr, tr_noop
 from sessions.prediction import SED
 from sessions.report.contents import AnswerFinding, PredictionFinding, Report, StrokeFinding
 from sessions.report.wording import shown_response
@@ -223,7 +223,7 @@ def progress_text(step: Step | None) -> str:
 def _name_of(finding: StrokeFinding | PredictionFinding | AnswerFinding) -> str:
     if finding.trial is None:
         return tr("stroke {number}", number=finding.number) if isinstance(finding, StrokeFinding) else tr("stroke –")
-    return f"{finding.trial}  {finding.experiment} {finding.code if finding.index is None else finding.index}"
+    return f"{aligned(finding.trial)}  {finding.experiment} {finding.code if finding.index is None else finding.index}"
 
 
 def _flaws(stroke: StrokeFinding) -> str:
@@ -269,7 +269,8 @@ def lineage(state: AnalystState) -> tuple[Link, ...]:
         links.append(Link(tr("trial {trial}", trial=row.trial), "trial"))
     prediction, stroke = row.prediction, row.stroke
     if prediction is not None and prediction.sed is not None:
-        links.append(Link(sed_text(state.report, prediction), "prediction", tr("averaged over the ending")))
+        whole = tr("{sed}, averaged over the ending", sed=sed_text(state.report, prediction))
+        links.append(Link(f"SED {1000.0 * prediction.sed:.3f} kPa", "prediction", whole))
     if stroke is None:
         return tuple(links)
     links.append(_friction(stroke, prediction))
@@ -286,6 +287,6 @@ def _friction(stroke: StrokeFinding, prediction: PredictionFinding | None) -> Li
     if prediction is not None and prediction.mu is not None:
         tau = "" if stroke.tau_max is None else tr(", τ max {tau_max:.1f} kPa", tau_max=1000.0 * stroke.tau_max)
         rule = tr("the model was given the {rule}", rule=tr(prediction.mu_rule))
-        return Link(f"µ {prediction.mu:.3f}{tau}", "friction", rule)
+        return Link(f"µ {prediction.mu:.3f}", "friction", f"{rule}{tau}")
     reason = stroke.reasons.get("mu_dynamic", "") if stroke.mu_dynamic is None else tr("mean over the steady window")
     return Link(f"µ {quantity(stroke.mu_dynamic, 3)}", "friction", reason)

@@ -63,7 +63,7 @@ class LineageLabel(QLabel):
             return
         self._links = links
         self._show()
-        text = " → ".join(link.text for link in links)
+        text = " → ".join(f"{link.text} ({link.detail})" if link.detail else link.text for link in links)
         self.setAccessibleName(tr("from the number back to its readings: {whole}", whole=text))
 
     def changeEvent(self, event: QEvent) -> None:
@@ -74,8 +74,9 @@ class LineageLabel(QLabel):
 
     def _show(self) -> None:
         style = f"color: {theme_of(self).act}"
-        elements = (f'<a href="{link.target}" style="{style}">{escape(link.text)}</a>' for link in self._links)
-        self.setText(" &nbsp;→&nbsp; ".join(elements))
+        texts = ((link.target, escape(link.text).replace(" ", "&nbsp;")) for link in self._links)
+        elements = (f'<a href="{target}" style="{style}">{text}</a>' for target, text in texts)
+        self.setText("&nbsp;&nbsp;→&nbsp; ".join(elements))
 
     def _show_tool_tip(self, target: str) -> None:
         self.setToolTip(next((link.detail for link in self._links if link.target == target), ""))
@@ -101,6 +102,7 @@ class AnalystWindow(QMainWindow):
         self.stroke = StrokeColumn(tokens, self.ask, self._replay_next)
         self.model = ModelColumn(tokens, self.ask, self._progress_label.show_text)
         self.progress = QProgressBar()
+        self.progress.setFormat("%p %")
         self.progress.setAccessibleName(tr("progress"))
         self.stop = button(tr("Stop  Esc"), tr("stop what is being done"), lambda: self.ask(m.Stop()))
         name = tr("have the model answer the trials that are left")

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from functools import partial
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QListWidget, QWidget
 
@@ -37,6 +37,7 @@ class CoursePanel(Panel):
         self.line = EntryLine(self._keep, self.leave)
         self.line.setAccessibleName(tr("reason or note"))
         self._question = label("", wrap=True)
+        self._question.setMinimumHeight(2 * self._question.fontMetrics().lineSpacing())  # nothing moves for a long one
         acts, columns = QWidget(), 3 if type_scale() <= 1.0 else 2
         grid = QGridLayout(acts)
         grid.setContentsMargins(0, 0, 0, 0)
@@ -118,8 +119,14 @@ class CoursePanel(Panel):
             typeface = self.plan.font()
             typeface.setBold(row.kind in ("block", "current"))
             item.setFont(typeface)
-            if row.kind == "current":
-                self.plan.scrollToItem(item, QListWidget.ScrollHint.EnsureVisible)
+        self._keep_in_sight()
+
+    def _keep_in_sight(self) -> None:
+        """Have the trial in hand among the rows that are seen."""
+        kinds = [] if self._view is None else [row.kind for row in self._view.rows]
+        if "current" in kinds and self.plan.count() == len(kinds):
+            self.plan.scrollToItem(self.plan.item(kinds.index("current")), QListWidget.ScrollHint.EnsureVisible)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         self.mirror.open.set_room(self.height() >= px(_ROOMY, most=1.4))
+        QTimer.singleShot(0, self, self._keep_in_sight)  # once the plan has its new height

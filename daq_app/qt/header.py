@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication, QBoxLayout, QSizePolicy, QWidget
 from daq_app.qt.painting import Lamp, paint_arrow
 from daq_app.qt.parts import Panel, button, hbox, label, regrade, set_horizontal, set_text
 from daq_app.qt.preferences import name_of
-from daq_app.qt.tokens import GRID, SMALL, font, px, theme_of
+from daq_app.qt.tokens import GRID, SMALL, TARGET, font, px, theme_of
 from daq_app.window.state import Message
 from daq_app.window.view import Banner, View
 from daq_app.window.view_course import Button
@@ -18,7 +18,7 @@ from daq_app.wording import tr, tr_noop
 
 _ONE_ROW = 1100  # width in which subject and lamp stand beside each other, before the font's scale [px]
 TWO_LINES = 4 * GRID  # of small type, before the font's scale [px]
-_ROOM = 52  # height of the notice's line, before the font's scale [px]
+_ROOM = TARGET + 4  # height of the notice's line, a button and its margins, before the font's scale [px]
 _LEAST = 2 * GRID  # height of what to do now, where it has no words [px]
 LEGIBLE = 4.0  # s: some twenty words, read at five a second
 _STROKES = tr_noop({1: "stroke away from the subject", -1: "stroke towards the subject", 0: "no stroke asked for"})
@@ -50,7 +50,8 @@ class Header(QWidget):
 
     def show_view(self, view: View) -> None:
         set_text(self._heading, view.heading)
-        set_text(self._device, f"{view.bench.name}: {view.bench.lamp_text}")
+        lamp_text = view.bench.lamp_text.replace(" ", "\u00a0")  # a line ends after the name
+        set_text(self._device, f"{view.bench.name}: {lamp_text}")
         set_text(self._language, name_of(view.subject.language), tr("language that the subject reads"))
         self._simulated.setVisible(view.simulated is not None)
         self._simulated.setToolTip(view.simulated or "")
@@ -157,12 +158,12 @@ class ToDo(Panel):
         if event.size().width() != event.oldSize().width():
             self.sentence.setMinimumHeight(_LEAST)
 
-    def show_small(self, small: bool) -> None:
-        """Use smaller type, and one button below the other, where there is little room."""
+    def show_small(self, small: bool, *, stacked: bool) -> None:
+        """Use smaller type where there is little room, and one button below the other where it is narrow."""
+        directions = QBoxLayout.Direction
+        self._buttons.setDirection(directions.BottomToTop if stacked else directions.LeftToRight)
         if small != self._small:
             self._small = small
-            directions = QBoxLayout.Direction
-            self._buttons.setDirection(directions.BottomToTop if small else directions.LeftToRight)
             regrade(self.sentence, "title" if small else "headline", "role")
             self.setMinimumHeight(0)
             self.sentence.setMinimumHeight(_LEAST)

@@ -34,9 +34,10 @@ from daq_app.wording import tr
 _COURSE = frozenset({"primary", *ACTS})  # of the session in hand
 # Before the scale of the fonts [px]:
 _WIDE = 1366  # below it the bench folds to a strip of lamps
+_STACKED = 800  # below it what to do now has its two buttons below each other, and the strip of lamps is gone
 _ROOMY = 1100  # below it the six axes and the sample fold away
 TALL = 620  # below it the type of the headline is smaller
-LOW = 540  # below it an empty notice gives up its line
+LOW = 540  # up to it an empty notice gives up its line
 CARDS, _PLAN = 600, 316  # widths of the checklist and of the plan
 LEAST_CARDS = 260  # width in which no field of the checklist is cut
 
@@ -298,10 +299,10 @@ class MainWindow(QMainWindow):
         self._left.setMaximumWidth(round((CARDS if cards else max(_PLAN, least / scale)) * scale))
         self._left.setMinimumWidth(round(max(_PLAN * scale, least)))
         self.bench.setFixedWidth(px(290))
-        self.strip.setVisible(not visible and width >= 800)
+        self.strip.setVisible(not visible and width >= _STACKED)
         self.live.set_room(width >= _ROOMY + (CARDS if cards else 0) and not (visible and not wide))
-        self.to_do.show_small(height < TALL or width < _ROOMY)
-        self.notice.set_collapsible(height < LOW)
+        self.to_do.show_small(height < TALL or width < _ROOMY, stacked=width < _STACKED)
+        self.notice.set_collapsible(height <= LOW)
         self.keys.fit()
 
     def _lay_out(self) -> QWidget:

@@ -44,14 +44,14 @@ class TrialStrip(QScrollArea):
         super().__init__()
         self._inspect = inspect
         self._view: tuple[Tile, ...] = ()
-        self.horizontalScrollBar().rangeChanged.connect(self._keep_in_sight)  # new tiles have their places then
+        self.horizontalScrollBar().rangeChanged.connect(self._take_room)  # new tiles have their places then
         self.tiles: list[QPushButton] = []
         inside = QWidget()
         self._row = hbox(1, on=inside, spacing=GRID // 2)
         scroll_area(inside, self)
         self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setAccessibleName(tr("trials of the session"))
-        self.setFixedHeight(max(px(2 * SMALL + 2 * GRID), TARGET) + 12 + GRID // 2)  # with the scroll bar
+        self._take_room(0, 0)
 
     def show_tiles(self, tiles: tuple[Tile, ...]) -> None:
         if tiles == self._view:
@@ -73,6 +73,11 @@ class TrialStrip(QScrollArea):
     def show_inspected_trial(self, number: int | None) -> None:
         for tile_button, tile in zip(self.tiles, self._view, strict=True):
             tile_button.setChecked(tile.number == number)
+
+    def _take_room(self, _least: int, greatest: int) -> None:
+        """Be as high as the tiles, and the scroll bar where there is one."""
+        self.setFixedHeight(max(px(2 * SMALL + 2 * GRID), TARGET) + (12 + GRID // 2 if greatest else 0))
+        self._keep_in_sight()
 
     def _keep_in_sight(self) -> None:
         current = next((index for index, tile in enumerate(self._view) if tile.kind == "current"), None)

@@ -17,7 +17,7 @@ from daq_app.qt.parts import WrappedLabel, button, choice, hbox, vbox
 from daq_app.qt.pictures import FILM_SUFFIXES, ComparedView, PictureView, SaveButtons, write_film, write_picture
 from daq_app.qt.plots import LINE, OWN, FieldBar, FieldPlot
 from daq_app.qt.tables import TextTable
-from daq_app.qt.tokens import Tokens
+from daq_app.qt.tokens import GRID, Tokens
 from daq_app.qt.transport_bar import TransportBar
 from daq_app.wording import tr
 from solver.quantities import SED
@@ -75,7 +75,7 @@ class ModelColumn(QWidget):
         self.comparison = ComparedView(self._compare, self._save)
         self.scene = TextTable(tr("scene and model"), (tr("of the model"), tr("value"), tr("remark")))
         session = QWidget()
-        vbox(self.picture_choice, self.session_errors, (self.picture, 1), on=session)
+        vbox(self.picture_choice, self.session_errors, (self.picture, 1), on=session, margins=GRID)
         self.tabs = QTabWidget()
         self.tabs.setAccessibleName(tr("pictures"))
         self.tabs.addTab(self._finger_page(), tr("Finger"))
@@ -249,5 +249,5 @@ class ModelColumn(QWidget):
         fingers, play = hbox((self.finger, 1), (self.compared_finger, 1)), hbox((self.player, 1), self.film)
         acts = hbox(self.near, self.mesh, self.together, self.history, (self.save, 1))
         plots = (fingers, 3), self.probe, (self.plot, 1)
-        vbox(self.fields, *plots, self.errors, self.failure_label, play, acts, on=page)
+        vbox(self.fields, *plots, self.errors, self.failure_label, play, acts, on=page, margins=GRID)
         return page

@@ -229,7 +229,7 @@ class NewSessionPage(Panel):
     def _build(self) -> None:
         height = field(tr("Height of the face above the transducer's origin [mm]"), self.height_above)
         vbox(height, field(tr("Axis along which pressing is positive"), self.normal), on=self._height)
-        vbox(field(tr("Contact area, for tau_max [mm²]"), self.area), on=self._area)
+        vbox(field(tr("Contact area, for τ max [mm²]"), self.area), on=self._area)
         folder_button = button("…", tr("choose the folder of sessions"), self._choose_folder)
         columns = (
             {

@@ -111,7 +111,7 @@ class ComparedView(QWidget):
         self.table = TextTable(tr("two sessions compared"), columns)
         self.table.setMinimumHeight(130)
         self.picture = PictureView(tr("the picture of both sessions"), save)
-        vbox(hbox((self.names_label, 1), self.choose), (self.table, 1), (self.picture, 2), on=self)
+        vbox(hbox((self.names_label, 1), self.choose), (self.table, 1), (self.picture, 2), on=self, margins=GRID)
         self.show_rows((), ("", ""))
 
     def show_rows(self, rows: ComparisonRows, sessions: tuple[str, str]) -> None:

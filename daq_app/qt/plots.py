@@ -51,7 +51,13 @@ class RoomyAxis(pg.AxisItem):
 
 
 def style_axis(axis: Any, tokens: Tokens, type_face: QFont) -> None:  # noqa: ANN401  pyqtgraph has no types
-    """Give an axis the colours of a theme and a type face."""
+    """Give an axis the colours of a theme, a type face and true minus signs."""
+    numbers = axis.tickStrings
+
+    def with_minus_signs(*ticks: Any) -> list[str]:  # noqa: ANN401
+        return [text.replace("-", "−") for text in numbers(*ticks)]
+
+    axis.tickStrings = with_minus_signs
     axis.setTickFont(type_face)
     axis.setLabel(**{"font-size": f"{type_face.pixelSize()}px"})
     axis.setPen(QColor(tokens.line))

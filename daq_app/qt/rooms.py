@@ -24,7 +24,7 @@ from PySide6.QtWidgets import (
 from daq_app.qt import preferences
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.keys import KEYS
-from daq_app.qt.parts import Panel, button, hbox, label, row_list, vbox
+from daq_app.qt.parts import Panel, button, hbox, label, row_list, set_text, vbox
 from daq_app.qt.preferences import name_of, recent_sessions, remember_session
 from daq_app.qt.tokens import GRID, px, theme_of
 from daq_app.window.state import NewSession
@@ -191,7 +191,7 @@ class ReviewRoom(QWidget):
         self.recent = row_list(tr("recent sessions"))
         self.recent.itemActivated.connect(self._open_item)
         self.recent.itemClicked.connect(self._open_item)
-        self._none = label(tr("Choose a session at the left, or open one."), "title", wrap=True)
+        self._none = label("", "title", wrap=True)
         self._side, choose = QWidget(), button(tr("Open…  Ctrl+O"), tr("open a recorded session"), self.choose)
         self._side.setFixedWidth(px(LIST_WIDTH))
         heading, margins = label(tr("Recent sessions"), "section"), (0, GRID, 0, GRID)
@@ -264,7 +264,10 @@ class ReviewRoom(QWidget):
 
     def _list(self) -> None:
         self.recent.clear()
-        for folder in recent_sessions():
+        folders = recent_sessions()
+        some, none = tr("Choose a session at the left, or open one."), tr("No session was recorded or opened yet.")
+        set_text(self._none, some if folders else none)
+        for folder in folders:
             item = QListWidgetItem("\n".join(folder.name.rsplit("_", 2)))  # subject, protocol, time: none is cut off
             item.setToolTip(str(folder))
             item.setData(Qt.ItemDataRole.UserRole, str(folder))

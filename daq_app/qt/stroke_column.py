@@ -51,7 +51,7 @@ class StrokeColumn(QWidget):
         self.tabs.setAccessibleName(tr("numbers and readings"))
         inside = QWidget()
         self._numbers = QFormLayout(inside)
-        self._numbers.setContentsMargins(0, 0, 0, 0)
+        self._numbers.setContentsMargins(GRID, GRID // 2, GRID, GRID // 2)
         self._numbers.setLabelAlignment(Qt.AlignmentFlag.AlignLeft)
         self._numbers.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         self._scroll = scroll_area(inside)  # where there is little room the numbers are scrolled, never cut

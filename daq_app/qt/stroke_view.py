@@ -168,7 +168,7 @@ class StrokeView(QWidget):
         if len(self._time):
             self._plots[0].setXRange(self._time[0], self._time[-1], padding=0.09)
             finite = self._columns[2][np.isfinite(self._columns[2])]
-            self._plots[1].setYRange(0.0, max(float(finite.max()), 0.01) if len(finite) else 1.0, padding=0.04)
+            self._plots[1].setYRange(0.0, max(float(finite.max()), 0.01) if len(finite) else 1.0, padding=0.1)
         low, high = self._forces.viewRange()[1]
         self._extent = self._range = low, high
         self._make_room()
@@ -268,4 +268,6 @@ def _plot(tokens: Tokens, name: str) -> Any:  # noqa: ANN401  pyqtgraph has no t
     item = plot.getPlotItem()
     item.showGrid(x=False, y=True, alpha=0.15)
     item.setLabel("left", name)
+    metrics = QFontMetricsF(font(SMALL))
+    item.getAxis("left").setWidth(round(metrics.horizontalAdvance("00.00") + 1.5 * metrics.height()))  # both alike
     return plot

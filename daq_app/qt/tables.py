@@ -123,7 +123,7 @@ class ReadingsTable(QWidget):
         self.table.setSelectionBehavior(QTableView.SelectionBehavior.SelectRows)
         self._model = _Model()
         self.table.setModel(self._model)
-        vbox(self.caption, (self.table, 1), on=self)
+        vbox(self.caption, (self.table, 1), on=self, margins=GRID)
 
     def show_readings(self, readings: RawReadings | None, steady: tuple[float, float] | None) -> None:
         """Show readings, those of the steady window marked by a word and by bold type."""

@@ -7,7 +7,7 @@ from typing import Literal
 from daq_app.recorder import messages as m
 from daq_app.window.course_state import IN_A_TRIAL, PICTURE, Quality, SessionState, TrialState, redo_targets
 from daq_app.window.state import BenchState, Message, NewSession
-from daq_app.wording import quantity, tr, tr_noop
+from daq_app.wording import aligned, quantity, tr, tr_noop
 from sessions.plan.plan import PROXIMAL_TO_DISTAL, SessionPlan, Trial
 from sessions.run import steps
 from sessions.strokes.stroke import Stroke
@@ -276,13 +276,13 @@ def _rows(session: SessionState) -> tuple[PlanRow, ...]:
 
 
 def _row(session: SessionState, trial: TrialState) -> PlanRow:
-    name = f"{trial.trial.number}  {trial.code}"
+    name = f"{aligned(trial.trial.number)}  {trial.code}"
     if trial.trial.number == session.trial and session.phase != "ended":
         return PlanRow("current", "▶", name, tr("take {takes}", takes=trial.takes) if trial.takes > 1 else "")
     if trial.outcome == "skipped":
         return PlanRow("skipped", "–", name, tr("skipped"))
     if trial.outcome == "coming":
-        return PlanRow("coming", " ", name)
+        return PlanRow("coming", "○", name)
     visible = session.plan.shown.experimenter
     quality = trial.quality
     mu = _mu(quality.stroke) if quality is not None and "forces" in visible else ""

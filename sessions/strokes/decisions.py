@@ -106,7 +106,7 @@ class Decision:
         """The decision, for people.
 
         >>> Decision("E02", "a ramp", "steady", 3, 1, (1.0, 2.0), (1.2, 2.0), number=4).sentence
-        'decision 4 by E02: steady of stroke 1 of trial 3 is 1.2 to 2 s (it was 1 to 2 s): a ramp'
+        'decision 4 by E02: steady of stroke 1 of trial 3 is 1.200 to 2.000 s (it was 1.000 to 2.000 s): a ramp'
         """
         opening = f"decision {self.number} by {self.by}: "
         if self.undoes is not None:
@@ -135,7 +135,8 @@ def _value_text(value: Value, unit: str) -> str:
     if value is None:
         return "not known"
     numbers = value if isinstance(value, tuple) else (value,)
-    return f"{(' to ' if unit == 's' else ' and ').join(f'{number:.6g}' for number in numbers)} {unit}".rstrip()
+    form, between = (".3f", " to ") if unit == "s" else (".6g", " and ")
+    return f"{between.join(format(number, form) for number in numbers)} {unit}".rstrip()
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,7 +55,7 @@ def test_every_stroke_has_a_line_that_names_its_trial(state):
     assert [row.stroke for row in lines if row.stroke] == list(state.report.strokes)
     for row, words in zip(lines, [row_text(row) for row in rows(state)], strict=True):
         assert row.prediction is None or row.stroke is None or row.prediction.stroke == row.stroke.number
-        assert row.trial is None or words.startswith(str(row.trial))
+        assert row.trial is None or words.lstrip().startswith(str(row.trial))
 
 
 @pytest.mark.parametrize(
@@ -85,7 +85,10 @@ def test_a_session_of_scores_alone_has_a_line_for_each_answer():
     answers = [AnswerFinding(n, "stickiness", 20, "K20", "scored", 10.0 * n) for n in (1, 2)]
     report = replace(example(), strokes=(), predictions=(), answers=tuple(answers))
     state = fold(AnalystState(Path("x")), m.ReportReady("predicted", report))
-    assert [row_text(row) for row in rows(state)] == ["1  stickiness 20  score 10", "2  stickiness 20  score 20"]
+    assert [row_text(row) for row in rows(state)] == [
+        "\u20071  stickiness 20  score 10",
+        "\u20072  stickiness 20  score 20",
+    ]
     second = fold(state, m.Choose(1))
     assert selected_row(second).trial == 2
     assert numbers(second) == ()

@@ -65,8 +65,8 @@ def test_everybody_who_decides_at_once_gets_a_line_and_a_number_of_its_own(recor
 @pytest.mark.parametrize(
     ("what", "old", "new", "words"),
     [
-        ("lift", 3.0, 2.5, "lift of stroke 1 of trial 1 is 2.5 s (it was 3 s): why"),
-        ("stick", None, (1.0, 1.25), "stick of stroke 1 of trial 1 is 1 to 1.25 s (it was not known): why"),
+        ("lift", 3.0, 2.5, "lift of stroke 1 of trial 1 is 2.500 s (it was 3.000 s): why"),
+        ("stick", None, (1.0, 1.25), "stick of stroke 1 of trial 1 is 1.000 to 1.250 s (it was not known): why"),
         ("direction", 1, -1, "direction of stroke 1 of trial 1 is -1 (it was 1): why"),
     ],
 )

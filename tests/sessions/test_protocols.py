@@ -2,12 +2,13 @@ from collections import Counter
 from itertools import pairwise
 
 import pytest
+from msgspec import structs
 from protocol_texts import OWN
 
 from sessions.plan.plan import Blinded, Finger, Frame
 from sessions.plan.protocols.planning import Body, StudyPlace, VisitSetting, plan
-from sessions.plan.protocols.protocol import FOLDER, protocol, protocol_names
-from sessions.toml_file import SettingsError
+from sessions.plan.protocols.protocol import FOLDER, Translation, protocol, protocol_names
+from sessions.toml_file import LONGEST_TEXT, SettingsError
 
 PAPER = "sensotact-friction"
 
@@ -91,6 +92,18 @@ def test_a_seed_out_of_range_is_refused():
 def test_an_unknown_protocol_is_refused_with_the_names_of_those_there_are():
     with pytest.raises(SettingsError, match=PAPER):
         protocol("nothing-like-it")
+
+
+@pytest.mark.parametrize("key", ["instruction", "question", "scale_ends"])
+def test_a_text_that_no_screen_of_a_subject_holds_is_refused_in_its_own_and_another_language(key):
+    block = protocol(PAPER).blocks[0]
+    text = "a" * (LONGEST_TEXT + 1)
+    value = (text, "very") if key == "scale_ends" else text
+    with pytest.raises(SettingsError, match=r"it has 1,501 letters, and a subject's screen holds 1,500$"):
+        structs.replace(block, **{key: value})
+    with pytest.raises(SettingsError, match=r"1,501 letters"):
+        Translation("de", "stickiness", **{"instruction": "kurz", key: value})
+    assert len(structs.replace(block, instruction="a" * LONGEST_TEXT).instruction) == LONGEST_TEXT
 
 
 @pytest.mark.parametrize(

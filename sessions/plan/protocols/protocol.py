@@ -17,6 +17,7 @@ from sessions.toml_file import (
     NotAllowed,
     SettingsError,
     check,
+    check_length,
     check_range,
     check_scale_ends,
     check_text,
@@ -66,6 +67,7 @@ class BlockOutline(msgspec.Struct, frozen=True):
         check(distinct, "indices", indices, "there must be at least one, and none may come twice")
         check(all(0 <= index <= 100 for index in indices), "indices", indices, "each must lie between 0 and 100")
         check_scale_ends(self.scale_ends)
+        check_length("question", self.question)
         check_range("strokes_allowed", self.strokes_allowed, 1, 20)
         check_range("repetitions", self.repetitions, 1, 20)
         practice, friction = list(self.practice), list(self.simulated_friction)
@@ -109,6 +111,7 @@ class Translation:
         check_language("language", self.language)
         check_text("instruction", self.instruction)
         check_scale_ends(self.scale_ends)
+        check_length("question", self.question)
 
 
 def check_language(key: str, language: str) -> None:

@@ -88,7 +88,7 @@ def test_the_card_of_the_transducer_says_its_zero_noise_and_life_and_enter_conne
     driver.until(
         lambda: row.summary.text().startswith("SIMULATED Net F/T SI-36-0.5: nothing lost.\n"), "readings in time"
     )
-    lines = row.summary.text().split("\n")
+    lines = row.summary.text().replace("\xa0", " ").split("\n")
     assert lines[1] == f"Zero: over {zero.duration:.1f} s, n = {zero.readings}."
     noise, unit = lines[2].removeprefix("Noise: ").split(",")[0].split()
     assert (float(noise), unit) == (float(f"{1000 * max(zero.noise[:3]):.2g}"), "mN")

@@ -11,13 +11,14 @@ from qt_events import click
 
 from daq_app.qt import preferences, tokens
 from daq_app.qt.bench_panel import BenchStrip
+from daq_app.qt.course_panel import CoursePanel
 from daq_app.qt.live_panel import LivePanel
 from daq_app.qt.middle import InspectedTrial, TrialStrip
 from daq_app.qt.preferences import DRAWER, DRAWER_SIZES
 from daq_app.window.course_state import Mark
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 from daq_app.window.state import NewSession
-from daq_app.window.view_course import Inspection, Tile
+from daq_app.window.view_course import Inspection, PlanRow, Tile
 from tests.daq_app.qt.written_text import cut_off
 from tests.daq_app.session_messages import stroke_at
 
@@ -90,6 +91,29 @@ def test_where_there_is_no_room_for_both_the_drawer_takes_the_place_of_the_strok
         assert not live.plots[hidden].isVisible()
         QTest.keyClick(window, Qt.Key.Key_D)
     assert preferences.settings().value(DRAWER) is None  # what there was no room for is no wish
+
+
+def test_the_finger_is_seen_all_through_a_trial_on_the_smallest_screen_with_a_whole_bench(driver):
+    window, live = at_size(driver, 1366, 768)
+    driver.begin()
+    driver.until(lambda: window.to_do.sentence.text().startswith("Mount"), "the first trial")
+    driver.application.processEvents()
+    assert live.finger.isVisible()
+
+
+def test_the_trial_in_hand_stays_among_the_rows_that_are_seen_when_the_plan_gets_lower(application):
+    panel = CoursePanel(lambda _: None)
+    rows = tuple(PlanRow("current" if at == 9 else "done", "✓", f"{at}  K50") for at in range(20))
+    panel._view = SimpleNamespace(rows=rows)
+    panel._show_rows(rows)
+    panel.show()
+    for height in (900, 380):
+        panel.resize(316, height)
+        for _ in range(3):
+            application.processEvents()
+        place = panel.plan.visualItemRect(panel.plan.item(9))
+        assert panel.plan.viewport().rect().contains(place)
+    panel.hide()
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])

@@ -13,6 +13,7 @@ from daq_app.qt.answer_fields import FULL, PressBar
 from daq_app.qt.subject_window import LARGER
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 from daq_app.window.subject import SubjectView
+from sessions.toml_file import LONGEST_TEXT
 from tests.daq_app.qt.written_text import cut_off
 
 pytestmark = pytest.mark.qt
@@ -38,6 +39,14 @@ def test_a_long_instruction_is_seen_whole_with_the_bar_beneath_it(subject_page, 
     boxes = [box(window._title), box(window._text), box(window.press)]
     assert all(window.rect().contains(rect) for rect in boxes)
     assert not any(upper.intersects(lower) for upper, lower in pairwise(boxes))
+
+
+@pytest.mark.parametrize(("text", "direction"), READING, ids=["German", "Japanese", "Arabic"])
+def test_the_longest_instruction_of_a_protocol_is_seen_whole_on_a_small_screen(subject_page, text, direction):
+    longest = (text * LONGEST_TEXT)[:LONGEST_TEXT]
+    window = subject_page(SubjectView("read", "Stroke the surface once", longest, force=True), 1.0, direction)
+    window.resize(960, 540)
+    assert cut_off(window) == []
 
 
 def test_type_becomes_smaller_only_where_a_text_is_not_seen_whole(subject_page):

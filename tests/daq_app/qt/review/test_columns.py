@@ -117,7 +117,10 @@ def test_every_sed_carries_its_depth_its_strain_and_the_errors_of_mesh_and_model
     assert prediction.error_estimate == pytest.approx(0.001)
     assert f"{condition} {error}" in finger_text(window.state)
     assert dict(numbers(window.state))[f"{condition}, averaged over the ending"] == error
-    assert f"{condition} {error}" in [link.text for link in lineage(window.state)]
+    [link] = [link for link in lineage(window.state) if link.target == "prediction"]
+    assert link.text == f"SED {1000 * prediction.sed:.3f} kPa"  # the line is short: what hovers says the rest
+    assert link.detail == f"{condition} {error}, averaged over the ending"
+    assert link.detail in window.lineage.accessibleName()
 
 
 def test_while_the_model_is_at_work_no_trial_is_said_to_lack_its_answer(window):
@@ -262,6 +265,8 @@ def test_ctrl_z_undoes_and_ctrl_shift_z_redoes_and_the_buttons_say_what(window):
 def test_the_pointer_over_a_stroke_reads_time_forces_and_friction(application, window):
     view = window.stroke.stroke
     plot = view._plots[0]
+    window._go_to(1)
+    application.processEvents()
     view.show_all()
     application.processEvents()
     trace = selected_row(window.state).stroke.trace
@@ -294,6 +299,15 @@ def test_readings_are_replayed_with_play_pause_speed_seek_and_step(window):
     player.toggle()
     QTest.keyClick(player, Qt.Key.Key_End)
     assert len(view._raw_curves[0].getData()[0]) == 50
+
+
+def test_the_way_back_takes_two_rows_in_half_a_small_screen_and_no_link_is_broken(window):
+    way = LineageLabel()
+    way.show_links(lineage(window.state))
+    assert way.heightForWidth(660) <= 2.5 * way.fontMetrics().lineSpacing()
+    links = re.findall(">([^<]+)</a>", way.text())
+    assert len(links) == 6
+    assert not any(" " in link for link in links)
 
 
 def test_every_link_of_the_way_back_is_followed_by_keys(application, window):

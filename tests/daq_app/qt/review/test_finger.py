@@ -167,7 +167,7 @@ def test_an_end_of_the_colours_is_typed_with_a_point_or_a_comma_in_every_country
 def test_a_failed_solve_says_where_when_and_why_and_its_last_good_state_stays(window):
     key = selected_row(window.state).key
     window.take(m.FingerHistory(key, film(lost=(0.5, 0.5)), "The drag wedges it."))
-    words = window.model.failure_label.text()
+    words = window.model.failure_label.accessibleName()
     assert "is step 4: at 0.300 s" in words
     assert words.endswith("The drag wedges it.")
     assert window.model.finger.look.lost == (0.5, 0.5)
