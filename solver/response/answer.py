@@ -22,8 +22,8 @@ from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Pr
 from solver.progress import Progress
 from solver.scene import Scene
 
-# Elements to a tip radius of the mesh that all others begin at. At finite strain 3 folds the skin of steep slides, and
-# 5 takes half as long again; at small strain ten surfaces take as long to 1 % from 3 and from 5.
+# Elements to a tip radius of the mesh that all others begin at. At finite strain 3 folds the skin of steep slides; 5
+# takes a tenth less time to 1 % and a fifth more to 0.1 %. At small strain 3 and 5 take as long to 1 %.
 FIRST_FINENESS = 4.0
 
 
