@@ -100,6 +100,14 @@ def test_a_surface_that_was_always_chosen_has_no_finite_value_and_is_named():
     assert paired_scale([]).reason
 
 
+def test_pairs_that_were_each_compared_once_make_a_scale():
+    games = [(0, 1, True), (2, 1, False), (2, 3, True), (0, 3, False), (0, 2, True), (3, 1, False)]
+    values = paired_scale([Choice("P1", *game) for game in games]).values
+    # 0 and 1 won two of three: 1/2 between them and 3/4 against each of the others are as many
+    assert values[0].value == pytest.approx(values[1].value)
+    assert values[1].value - values[2].value == pytest.approx(math.log(3.0))
+
+
 def test_preference_is_not_told_from_order_where_one_surface_was_always_first():
     star = [Choice("P1", 0, other, won) for other in (20, 50) for won in (True, False, True)]
     scale = paired_scale(star)
@@ -116,4 +124,7 @@ def test_a_circle_of_three_is_one_triad_and_an_order_none():
     # A regular tournament of seven has 14 circular triads, as many as there can be (Kendall and Babington Smith 1940)
     regular = [Choice("P3", a, (a + step) % 7, True) for a in range(7) for step in (1, 2, 3)]
     assert (consistence(regular)["P3"].triads, consistence(regular)["P3"].zeta) == (14, 0.0)
+    # Of four, one beats two and the other pair likewise: two circular triads, the most there can be (same source)
+    even = [Choice("P4", a, b, True) for a, b in ((0, 1), (1, 2), (2, 3), (3, 0), (0, 2), (1, 3))]
+    assert (consistence(even)["P4"].triads, consistence(even)["P4"].zeta) == (2, 0.0)
     assert not consistence([*circle, Choice("P2", 1, 0, True)])  # a pair chosen once each way

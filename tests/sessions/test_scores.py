@@ -5,12 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from recordings import new_writer
+from scipy import stats
 
 from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.recording import Recording
 from sessions.report import findings
 from sessions.report.tables.session import tables
-from sessions.statistics.correlations import relation
+from sessions.statistics.correlations import relation, slope_interval
 from sessions.statistics.scores import (
     Score,
     ScoreTable,
@@ -115,6 +116,13 @@ def test_the_interval_of_rho_is_bonett_and_wrights():
 def test_the_line_is_the_least_squares_line():
     correlation = relation([0, 1, 2, 3], [1, 3, 5, 7], labels=(0, 1, 2, 3))
     assert (correlation.slope, correlation.intercept) == (pytest.approx(2), pytest.approx(1))
+
+
+def test_the_interval_of_the_slope_is_the_t_interval_of_its_standard_error():
+    x, y = [0.0, 1.0, 2.0, 4.0, 7.0], [1.0, 0.5, 2.5, 3.0, 9.0]
+    line = stats.linregress(x, y)
+    half = stats.t.ppf(0.975, 3) * line.stderr
+    assert slope_interval(relation(x, y, labels=x)) == pytest.approx((line.slope - half, line.slope + half))
 
 
 def test_a_perfect_r_has_no_interval_and_says_so():

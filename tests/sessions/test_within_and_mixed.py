@@ -40,6 +40,14 @@ def test_the_correlation_within_subjects_is_the_published_one():
     assert correlation.p == pytest.approx(0.000847, abs=2e-6)
 
 
+def test_the_interval_of_one_subject_is_fishers_of_an_ordinary_correlation():
+    x, y = np.random.default_rng(5).normal(size=(2, 12)) + np.arange(12.0)
+    expected = stats.pearsonr(x, y)
+    correlation = repeated_correlation(["a"] * 12, x, y)
+    assert (correlation.r, correlation.p) == pytest.approx((expected.statistic, expected.pvalue))
+    assert (correlation.low, correlation.high) == pytest.approx(tuple(expected.confidence_interval(0.95)))
+
+
 def test_the_interval_for_other_people_is_that_of_the_jackknife_over_them():
     rng = np.random.default_rng(3)
     names, x = np.repeat(list("abcdef"), 5), rng.normal(size=30)
@@ -182,6 +190,7 @@ def test_differences_between_stimuli_are_paired_and_leave_each_subjects_level_ou
     assert (difference.low_index, difference.high_index, difference.n, difference.mean) == (0, 50, 3, 6.0)
     # t(0.975, 2) = 4.302653 times 2 / sqrt(3), by tables
     assert (difference.low, difference.high) == pytest.approx((6.0 - 4.968275, 6.0 + 4.968275), abs=1e-5)
+    assert difference.p == pytest.approx(stats.ttest_rel([14.0, 66.0, 38.0], [10.0, 60.0, 30.0]).pvalue)
     assert difference.p_holm == difference.p
 
 
