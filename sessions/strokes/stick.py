@@ -42,7 +42,7 @@ class Climb(NamedTuple):
         remaining_slope[inside] = -self.bend * remaining[inside] ** (self.bend - 1.0) / duration
         bend_slope[inside] = -(remaining[inside] ** self.bend) * np.log(remaining[inside])
         progress, peak_left = _progress_and_peak(self, time).T
-        share = np.full_like(time, self.rise) if self.fall == 0.0 else self.rise + self.peak * _peak_decay(self, time)
+        share = self.rise + self.peak * _peak_decay(self, time)
         columns = np.zeros((len(time), 7))
         columns[:, 0], columns[:, 1] = share * remaining_slope * remaining, share * remaining_slope * (1.0 - remaining)
         columns[:, 2] = share * bend_slope

@@ -259,6 +259,19 @@ def test_coarse_torques_give_no_speed():
     assert {"speed_not_measurable", "no_steady_sliding"} & set(stroke.flaws)
 
 
+@pytest.mark.parametrize("degrees", [30.0, 90.0, 200.0])
+def test_a_stroke_obliquely_across_the_face_has_the_numbers_of_one_along_it(degrees):
+    raw, turn = noisy(slide(T)), np.radians(degrees)
+    turned, (c, s) = raw.copy(), (np.cos(turn), np.sin(turn))
+    for x, y in ((0, 1), (3, 4)):
+        turned[:, x], turned[:, y] = c * raw[:, x] - s * raw[:, y], s * raw[:, x] + c * raw[:, y]
+    along, oblique = (analyse(block(T, readings)) for readings in (raw, turned))
+    for name in ("mu_dynamic", "mu_max", "speed", "tau_max", "normal_force"):
+        expected = getattr(along.strokes[0], name)
+        assert getattr(oblique.strokes[0], name) == pytest.approx(expected, rel=1e-9), name
+    assert "side_load" not in names(oblique)
+
+
 def test_a_finger_that_goes_the_wrong_way_is_named():
     analysis = analyse(block(T, noisy(slide(T, direction=-1))), of=trial(direction=1))
     assert "wrong_direction" in names(analysis)

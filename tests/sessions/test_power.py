@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from daq_app.cli.main import run
-from sessions.statistics.power import MU_RANGE, AssumedEffects, power
+from sessions.statistics.power import MU_RANGE, AssumedEffects, Power, power
 
 PLAIN = AssumedEffects(effect=10.0, noise=12.0, level_sd=12.0, slope_sd=0.0, friction_sd=0.0)
 
@@ -25,6 +25,10 @@ def test_with_alike_people_and_exact_friction_the_power_is_nearly_that_of_a_t_te
 def test_without_an_effect_the_test_detects_one_in_about_five_of_a_hundred():
     (design,) = power(AssumedEffects(effect=0.0), (10,), (5,), 600, 2)
     assert 0.02 <= (design.detections + design.wrong) / design.studies <= 0.08
+
+
+def test_the_error_of_a_power_is_that_of_a_share_of_so_many_studies():
+    assert Power(8, 5, detections=20, wrong=0, studies=100).half == pytest.approx(1.96 * 0.04)  # sqrt(0.2 0.8 / 100)
 
 
 def test_more_subjects_find_more_and_spread_people_less():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from daq_app.cli.main import run
+from sessions.statistics import power
 from sessions.statistics.power import AssumedEffects, recovery, twins
 
 DEPTHS = (1.0, 2.0)
@@ -29,6 +30,14 @@ def test_scores_that_follow_nothing_prefer_each_of_three_about_equally_often(stu
     nothing = AssumedEffects(0.0, noise=4.0, level_sd=10.0, slope_sd=0.0)
     result = recovery(strokes(1, 0.0), 10, DEPTHS, "sed", nothing, studies, np.random.default_rng(2))
     assert result.preferred == pytest.approx(1.0 / 3.0, abs=0.2)  # three standard errors of 45 studies
+
+
+def test_scores_spread_with_the_true_quantity_by_the_effect_over_the_root_of_twelve(monkeypatch):
+    scores = []
+    monkeypatch.setattr(power, "crossed_deviance", lambda _who, _what, y, _x: scores.append(y) or 0.0)
+    certain = AssumedEffects(30.0, noise=0.0, level_sd=0.0, slope_sd=0.0)
+    recovery(strokes(1, 0.5), 12, DEPTHS, "sed", certain, 1, np.random.default_rng(2))
+    assert np.std(scores[0]) == pytest.approx(30.0 / np.sqrt(12.0))  # as evenly over a range of 30
 
 
 def test_a_twin_is_what_goes_with_the_true_quantity_in_either_sense():

@@ -62,6 +62,8 @@ def test_one_subject_alone_has_a_mean_and_a_reason_instead_of_an_interval():
     (mean,) = mean_scores([table("P01", [37])])
     assert (mean.mean, mean.low, mean.high, mean.sd) == (37, None, None, None)
     assert "one subject" in mean.reason
+    (mean,) = mean_scores([table("P01", [37]), table("P02", [39])])
+    assert (mean.mean, mean.high - mean.mean) == (38, pytest.approx(12.7062, abs=1e-4))  # t(0.975, 1), by tables
 
 
 def test_an_interval_ends_where_the_scale_does():

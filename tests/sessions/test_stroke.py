@@ -25,16 +25,29 @@ from closed_form import (
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
+from scipy.stats import linregress
 
 from sessions.plan.plan import Frame
 from sessions.strokes.bootstrap import BootstrapSettings, stroke_intervals
 from sessions.strokes.forces import Filter, centre_of_pressure, friction_ratio, in_face_frame, normal_force
-from sessions.strokes.sliding import movement, steady_window
+from sessions.strokes.sliding import displacement, movement, steady_window
 from sessions.strokes.stroke import StrokeCurve
 
 
 def steadily(**changes):
     return replace(SETTINGS, steady=replace(SETTINGS.steady, **changes))
+
+
+def test_a_speed_has_the_standard_error_and_the_r_squared_of_its_regression():
+    time = np.arange(12.0) * SETTINGS.filter.block
+    place = 20.0 * time + np.random.default_rng(4).normal(size=12)
+    line = linregress(time, place)
+    motion = movement(time, np.column_stack([0.6 * place, 0.8 * place]), 1.0 / SETTINGS.filter.block, SETTINGS)
+    assert motion.along == pytest.approx((0.6 * line.slope, 0.8 * line.slope))
+    assert (motion.speed, motion.error) == pytest.approx((line.slope, line.stderr))
+    assert motion.explained == pytest.approx(line.rvalue**2)
+    assert displacement(np.array([[0.0, 0.0], [3.0, 4.0]])) == 5.0
+    assert np.isnan(displacement(np.array([[1.0, 2.0]])))
 
 
 def test_a_plain_stroke_comes_back_without_a_flaw():
