@@ -26,6 +26,7 @@ from daq_app.qt.parts import (
     scroll_area,
     set_horizontal,
     vbox,
+    whole_facts,
 )
 from daq_app.qt.plots import ZoomedPlot, pg
 from daq_app.qt.stroke_column import StrokeColumn
@@ -308,7 +309,7 @@ class TrialsColumn(QWidget):
             self.list.addItems(lines)
         for index, row in enumerate(rows(state)):
             item, marks = self.list.item(index), marks_of(row)
-            item.setText(lines[index])
+            item.setText(whole_facts(lines[index]))
             item.setToolTip(marks)
             item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{lines[index]} {marks}".rstrip())
         self.list.setCurrentRow(state.row if selected_row(state) is not None else -1)

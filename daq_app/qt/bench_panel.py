@@ -82,7 +82,7 @@ class BenchPanel(Panel):
                 set_text(self._counters[name], text, tr(name), grade)
         for bar in view.bars:
             self._bars[bar.name].show_bar(bar)
-        if previous is None or previous.devices != view.devices:
+        if previous is None or (previous.devices, previous.uri) != (view.devices, view.uri):
             self._show_devices(view)
         self.search.setText(tr("Searching") if view.searching else tr("Search"))
         self.search.setEnabled(not view.searching)

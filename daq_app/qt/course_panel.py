@@ -8,7 +8,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QListWidget, QWidget
 
 from daq_app.qt.keys import KEYS
-from daq_app.qt.parts import EntryLine, Panel, button, hbox, label, row_list, set_text, stack_pages, vbox
+from daq_app.qt.parts import EntryLine, Panel, button, hbox, label, row_list, set_text, stack_pages, vbox, whole_facts
 from daq_app.qt.preferences import type_scale
 from daq_app.qt.subject_picture import Mirror
 from daq_app.qt.tokens import GRID, TARGET, px
@@ -113,8 +113,8 @@ class CoursePanel(Panel):
             self.plan.addItems([""] * len(rows))
         for index, row in enumerate(rows):
             item = self.plan.item(index)
-            text = f"{row.name} {row.outcome}" if row.kind == "block" else f"{row.mark}  {row.name}   {row.outcome}"
-            item.setText(text)
+            facts = f"{row.mark}  {row.name}   {row.outcome}"
+            item.setText(f"{row.name} {row.outcome}" if row.kind == "block" else whole_facts(facts))
             item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{row.kind}: {row.name} {row.outcome}")
             typeface = self.plan.font()
             typeface.setBold(row.kind in ("block", "current"))

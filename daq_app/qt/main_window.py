@@ -128,7 +128,7 @@ class MainWindow(QMainWindow):
             "primary": self._primary,
             "undo": lambda: self.rooms.room == "run" and self.course.ask("undo"),
             "new": lambda: self.rooms.session_over and self.go_to("prepare"),
-            "tare": lambda: self.bridge.view.bench.can_tare and self.bridge.send(Tare()),
+            "tare": self._tare,
             "connect": self.bench.connect_choice,
             "acknowledge": lambda: self.bridge.view.bench.can_acknowledge and self.bridge.send(AcknowledgeOverloads()),
             "hold": self.live.bar.hold.click,
@@ -208,6 +208,12 @@ class MainWindow(QMainWindow):
         else:
             self._form_changed()
             self.page.go_to_missing()
+
+    def _tare(self) -> None:
+        if self.bridge.view.bench.can_tare:
+            self.bridge.send(Tare())
+        elif self.bridge.recording:
+            self.notice.warn(tr("Each trial measures its own zero; the bench is zeroed outside of a session."))
 
     def _pilot(self) -> None:
         if self.bridge.view.course is None and self.rooms.room == "prepare":

@@ -29,13 +29,13 @@ def blank(widget: QWidget, colour: str) -> QPixmap:
 
 
 def paint_fitted(painter: QPainter, picture: QPixmap) -> QRect:
-    """Paint a picture in the middle, as large as there is room and its proportions kept; return where it is."""
+    """Paint a picture at the top, as large as there is room and its proportions kept; return where it is."""
     window, ratio = painter.window(), painter.device().devicePixelRatioF()
     smooth = Qt.TransformationMode.SmoothTransformation
     pixmap = picture.scaled(window.size() * ratio, Qt.AspectRatioMode.KeepAspectRatio, smooth)
     pixmap.setDevicePixelRatio(ratio)
     box = QRect(QPoint(), pixmap.deviceIndependentSize().toSize())
-    box.moveCenter(window.center())
+    box.moveLeft(window.center().x() - box.width() // 2)
     painter.drawPixmap(box.topLeft(), pixmap)
     return box
 

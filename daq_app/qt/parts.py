@@ -48,17 +48,27 @@ def label(text: str = "", role: str = "value", *, wrap: bool = False) -> QLabel:
 
 # Spaces that no line ends at: between a number and its unit, a symbol and its number, before a dot that parts facts.
 _TIES = re.compile(
-    r"(?<=\d) (?=(?:[%°]|[mkµM]?(?:N|Pa|Hz|m|s|B)[²³]?)(?!\w))|(?<=N) (?=mm\b)|(?<=[µ±×≤τ]) (?=[\d−–m])| (?=·)"
+    r"(?<=\d) (?=(?:[%°]|[mkµM]?(?:N|Pa|Hz|m|s|B)[²³]?)(?!\w))|(?<=N) (?=mm\b)|(?<=[µ±×≤τ]) (?=[\d−–m])"
+    r"|(?<=\d) (?=of \d)|(?<=\d of) (?=\d)| (?=·)"
 )
 
 
 def breakable(text: str) -> str:
     r"""Return a text whose lines may end within a long word, but not within a quantity.
 
-    >>> breakable("µ 0.43, 2 N mm · 10 % of 3 trials").split(" ")
-    ['µ\xa00.43,', '2\xa0N\xa0mm\xa0·', '10\xa0%', 'of', '3', 'trials']
+    >>> breakable("µ 0.43, 2 N mm · 10 % of 3 trials, 5 of 10").split(" ")
+    ['µ\xa00.43,', '2\xa0N\xa0mm\xa0·', '10\xa0%', 'of', '3', 'trials,', '5\xa0of\xa010']
     """
     return re.sub(r"[^\s/]{30}", "\\g<0>\u200b", _TIES.sub("\u00a0", text))
+
+
+def whole_facts(row: str) -> str:
+    r"""Return a row of facts, two or more spaces apart, each of which stays whole where it takes a second line.
+
+    >>> whole_facts("✓  3  R29   no answer")
+    '✓  3  R29   no\xa0answer'
+    """
+    return re.sub(r"(?<! ) (?! )", "\u00a0", row)
 
 
 class Panel(QFrame):

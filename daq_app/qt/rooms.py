@@ -1,5 +1,6 @@
 """The ways through the window: its menu, the rail, and the rooms. Menu entries are acts that keys do too."""
 
+import re
 from collections.abc import Callable, Mapping
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
@@ -54,6 +55,7 @@ PANELS = (
 )  # fmt: skip
 _LIBRARIES = ("PySide6-Essentials", "numpy", "scipy", "numba")
 LIST_WIDTH = 200  # of the recent sessions, before the font's scale [px]
+_STAMP = re.compile(r"(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)")  # in the name of a session's folder
 LEAST_FOR_LIST = 760  # width for the list beside an open session: in less the menu alone lists them; likewise [px]
 
 
@@ -268,7 +270,8 @@ class ReviewRoom(QWidget):
         some, none = tr("Choose a session at the left, or open one."), tr("No session was recorded or opened yet.")
         set_text(self._none, some if folders else none)
         for folder in folders:
-            item = QListWidgetItem("\n".join(folder.name.rsplit("_", 2)))  # subject, protocol, time: none is cut off
+            lines = "\n".join(folder.name.rsplit("_", 2))  # subject, protocol, time: none is cut off
+            item = QListWidgetItem(_STAMP.sub(r"\1-\2-\3 \4:\5:\6", lines))
             item.setToolTip(str(folder))
             item.setData(Qt.ItemDataRole.UserRole, str(folder))
             self.recent.addItem(item)

@@ -100,7 +100,8 @@ class Bench:
             self.uri = None
             raise
         assert self.connected is not None
-        self._send(Device(self.connected.transducer.info, self.connected.frame))
+        info = replace(self.connected.transducer.info, uri=uri)  # a simulated one is reached by an address of its own
+        self._send(Device(info, self.connected.frame))
 
     @contextmanager
     def instead(self, uri: str) -> Generator[None]:

@@ -344,8 +344,10 @@ def _banner(state: AppState) -> Banner | None:
         axes = ", ".join(tr(axis) for axis in overloads)
         warning = tr("Overload on {axes}: take the load off and check the transducer.", axes=axes)
         return Banner("wrong", warning, tr("Acknowledge"), m.AcknowledgeOverloads())
-    if state.failure is not None:
-        return Banner("look", sentence(state.failure.sentence), tr("Dismiss"), Dismissed())
+    if (failure := state.failure) is not None:
+        text = tr("The session was not taken up again: {why}", why=failure.sentence)
+        text = sentence(text if failure.request == "ResumeSession" else failure.sentence)
+        return Banner("look", text, tr("Dismiss"), Dismissed())
     if state.drawing_error is not None:
         warning = tr("Something in the window failed ({problem}); the recording goes on.", problem=state.drawing_error)
         return Banner("look", warning, tr("Dismiss"), Dismissed())

@@ -6,7 +6,7 @@ from session_messages import INFO
 
 from daq_app.recorder.bench import Bench
 from daq_app.recorder.display import Display
-from daq_app.recorder.messages import Failed, HealthReport, LinkBack, LinkDown, Live, NoDevice, Tared
+from daq_app.recorder.messages import Device, Failed, HealthReport, LinkBack, LinkDown, Live, NoDevice, Tared
 from drivers.clock import RealClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import Health, LinkLost, SetupError
@@ -46,6 +46,10 @@ def test_a_tare_that_a_session_or_a_lost_transducer_ends_is_reported(seat):
     seat.bench.lose("the cable is out")
     words = [report.sentence.partition(": ")[2] for report in seat.reports if isinstance(report, Failed)]
     assert words == ["a session began; zero again after it", "the transducer is no longer connected"]
+
+
+def test_what_is_reported_has_the_address_that_was_asked_for(seat):
+    assert [report.info.uri for report in seat.reports if isinstance(report, Device)] == ["sim:?seed=7"]
 
 
 def test_a_transducer_at_the_address_that_is_asked_for_stays_connected(seat):

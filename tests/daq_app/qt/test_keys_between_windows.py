@@ -263,3 +263,18 @@ def test_an_address_that_is_being_typed_stays_when_other_devices_are_found(drive
     assert panel._choice.currentText() == "net-ft://10.0.0.9"
     assert panel._selected_uri() == "net-ft://10.0.0.9"
     panel._show_devices(view)
+
+
+def test_the_address_of_the_bench_is_that_of_the_transducer_which_a_session_brought(driver):
+    panel, view = driver.window.bench, driver.view.bench
+    try:
+        panel.show_view(replace(view, uri="net-ft://10.0.0.9"))
+        assert panel._choice.currentText() == "net-ft://10.0.0.9"
+    finally:
+        panel.show_view(view)
+
+
+def test_a_key_for_the_zero_says_in_a_session_that_each_trial_measures_its_own(driver):
+    driver.begin()
+    driver.window.act("tare")
+    assert driver.window.notice.warning.startswith("Each trial measures its own zero")

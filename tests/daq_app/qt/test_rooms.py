@@ -80,7 +80,7 @@ def test_a_session_that_has_ended_is_opened_with_the_mouse_and_a_key_leads_back(
     assert rooms.room == "review"
     assert rooms.analyst.state.folder == folder
     assert preferences.recent_sessions()[0] == folder.absolute()
-    assert rooms.review.recent.item(0).text().replace("\n", "_") == folder.name
+    assert rooms.review.recent.item(0).data(Qt.ItemDataRole.UserRole) == str(folder.absolute())
     QTest.keyClick(rooms.analyst.trials.list, Qt.Key.Key_F3)  # from wherever the keyboard is
     assert rooms.room == "run"
 
@@ -149,6 +149,7 @@ def test_the_name_of_a_session_is_whole_in_the_list(driver, rooms, tmp_path):
     driver.window.act("go to review")
     driver.application.processEvents()
     recent = rooms.review.recent
+    assert recent.item(0).text() == "P03\na-protocol-of-our-own\n2026-11-28 08:26:38-rescued"
     assert recent.visualItemRect(recent.item(0)).width() <= recent.viewport().width()
     assert recent.visualItemRect(recent.item(0)).height() >= 4 * recent.fontMetrics().height()
 
