@@ -44,9 +44,8 @@ def order_of(finger: Finger[Any], state: EquilibriumState) -> float:
     """
     scene = finger.scene
     squeezed = _check_cut(finger, state) if isinstance(finger, FiniteFinger) and scene.finger.cut == "free" else False
-    kind = scene.solve.kinematics
-    stiffens = kind == "finite" and any(tissue.law == "ogden" for tissue in scene.materials.by_region)
-    at_corner = squeezed or stiffens or _stiffness_ratio(scene.materials)[0] > SECOND_ORDER[kind]
+    stiffens = any(tissue.law == "ogden" for tissue in scene.materials.by_region)
+    at_corner = squeezed or stiffens or _stiffness_ratio(scene.materials)[0] > SECOND_ORDER[scene.solve.kinematics]
     return CORNER_ORDER if at_corner else ORDER
 
 

@@ -217,6 +217,32 @@ def test_the_error_at_a_corner_of_very_stiff_tissue_is_of_first_order_and_the_es
     assert 4 / 3 * abs(prediction.nested.numbers[0] / prediction.sed_ending - 1.0) < error < prediction.error_estimate
 
 
+@pytest.mark.parametrize(
+    ("kinematics", "dermis", "order"),
+    [
+        ("small", Material(3.4, 0.48), 2.0),  # 100 times as stiff as the fat
+        ("small", Material(3.5, 0.48), 1.0),
+        ("finite", Material(0.204, 0.48), 2.0),  # 6 times
+        ("finite", Material(0.21, 0.48), 1.0),
+        ("finite", Material(0.08, 0.48, "ogden", 8.0), 1.0),
+    ],
+)
+def test_errors_fall_with_the_square_where_neither_stiff_nor_stiffening_skin_carries_the_drag_to_the_cut(
+    kinematics, dermis, order
+):
+    settings = Solve(kinematics, evidence="quick")
+    press = Scene(
+        materials=Materials(dermis=dermis), friction=Friction(0.0), loading=Loading(0.4, "none"), solve=settings
+    )
+    assert solve(press).nested.order == order
+
+
+def test_presses_deeper_than_half_of_the_tissue_at_finite_strain_warn_that_estimates_were_not_tried_there():
+    for kinematics, depth, count in (("finite", 2.3, 0), ("finite", 2.4, 1), ("small", 2.4, 0)):
+        scene = Scene(friction=Friction(0.0), loading=Loading(0.5, "none"), solve=Solve(kinematics))  # 4.74 mm thick
+        assert len([*trial_warnings(scene, depth)]) == count
+
+
 def test_tissues_that_relax_warn_of_a_difference_in_stiffness_as_the_elastic_ones_that_they_relax_to():
     # With half its shear modulus relaxed, G = 0.08 and K = 0.1 MPa become G = 0.04 and K = 0.1: E = 0.105882.
     relaxing = Material(9.0 * 0.08 * 0.1 / 0.38, 0.14 / 0.76, prony=(Relaxation(0.5, 1.0),))
