@@ -176,7 +176,7 @@ def last_edge(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> float |
     gaps = place[line] - place[line - 2], place[line + 2] - place[line]
     forces[0] *= gaps[1] / (gaps[0] + gaps[1])  # the share of the line's own force that acts beyond it
     moment = sum(push * (position - place[line]) for push, position in zip(forces, place[line : last + 1], strict=True))
-    # Force that falls like the square root of the distance has its centre two fifths of the way to its end. The end lies
+    # Force that falls like the square root of the distance has its centre two fifths of the way to its end. That lies
     # nearer to the last touching node than to the one before.
     end, least = place[line] + 2.5 * moment / sum(forces), (place[last - 1] + place[last]) / 2.0
     return min(max(end, least), place[min(last + 1, len(place) - 1)])
