@@ -91,12 +91,14 @@ def command_line() -> Parser:
 @contextmanager
 def _without_garbage_collection() -> Generator[None]:
     """Collect no garbage inside, and never what was made inside: it stays, and searching it would delay the window."""
+    enabled = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
         gc.freeze()
-        gc.enable()
+        if enabled:
+            gc.enable()
 
 
 @_without_garbage_collection()
@@ -161,9 +163,11 @@ def _show_window(build: "Callable[[QApplication], QWidget]") -> int:
         from PySide6.QtWidgets import QApplication
     except ImportError as error:
         return _fail(missing_library(error))
+    from daq_app.qt.garbage import GarbageCollector
     from daq_app.tablet.server import NoTabletServer
 
     application = QApplication(sys.argv[:1])
+    GarbageCollector(application).begin()
     _speak(application)
     try:
         window = build(application)

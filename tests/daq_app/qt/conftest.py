@@ -14,6 +14,7 @@ from PySide6.QtCore import QEvent, QSettings, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from daq_app.qt.garbage import GarbageCollector
 from daq_app.qt.preferences import SCALE, settings, type_scale
 from daq_app.qt.start import open_window
 from daq_app.qt.subject_window import SubjectWindow
@@ -59,7 +60,7 @@ class Driver:
         while not condition():
             assert time.monotonic() < end, f"{what} did not come: {self.state.failure}, {self.view.banner}"
             self.application.processEvents()
-            time.sleep(0.002)
+            time.sleep(0.005)
 
     def phase(self, *phases):
         self.until(lambda: self.session is not None and self.session.phase in phases, f"{phases}")
@@ -106,7 +107,9 @@ def application(tmp_path_factory):
 
 @pytest.fixture(scope="module", autouse=True)
 def no_window_stays(application):
-    """Delete every window after the tests of its file: one that stays is styled again with each that opens."""
+    """Collect as the program does, and delete every window after its file: one that stays is styled with the next."""
+    collector = GarbageCollector(application)
+    collector.begin()
     yield
     for widget in application.topLevelWidgets():
         if type(widget).__module__.startswith("daq_app.") and widget.parent() is None:
@@ -115,6 +118,7 @@ def no_window_stays(application):
     gc.unfreeze()  # an opening window keeps all there is from collection
     gc.collect()
     gc.freeze()
+    collector.end()
 
 
 @pytest.fixture
