@@ -2,9 +2,12 @@
 
 import threading
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from statistics import NormalDist
 
 import numpy as np
+import numpy.typing as npt
 
 from drivers.arrays import Array
 from drivers.calibration import Calibration
@@ -20,17 +23,20 @@ def _white_noise(seed: int, times: Array, channels: int = 6) -> Array:
     Instants in the same microsecond share their noise. The hash is SplitMix64 (Steele, Lea, Flood, 2014), keyed by
     the seed and counted by instant and channel; the normal deviate is the inverse of the distribution at that point.
     """
-    from scipy.special import ndtri  # slow to load, and a bench that is no simulated one has no need of it
-
     instants = np.rint(times * 1e6).astype(np.int64).astype(np.uint64)
-    key = np.random.SeedSequence(seed).generate_state(1, np.uint64)  # an array: scalars would warn on wrapping
     counter = instants[:, None] * np.uint64(channels) + np.arange(channels, dtype=np.uint64)
-    bits = key + counter * np.array([0x9E3779B97F4A7C15], np.uint64)
+    bits = _key(seed) + counter * np.array([0x9E3779B97F4A7C15], np.uint64)
     bits = (bits ^ (bits >> np.uint64(30))) * np.array([0xBF58476D1CE4E5B9], np.uint64)
     bits = (bits ^ (bits >> np.uint64(27))) * np.array([0x94D049BB133111EB], np.uint64)
     bits ^= bits >> np.uint64(31)
     uniform = ((bits >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
-    return np.asarray(ndtri(uniform), np.float64)
+    deviates = map(NormalDist().inv_cdf, uniform.ravel().tolist())  # SciPy's is faster, and takes 0.2 s to load
+    return np.fromiter(deviates, np.float64, uniform.size).reshape(uniform.shape)
+
+
+@cache
+def _key(seed: int) -> npt.NDArray[np.uint64]:
+    return np.array([*np.random.SeedSequence(seed).generate_state(1, np.uint64)], np.uint64)
 
 
 Six = tuple[float, float, float, float, float, float]
@@ -94,7 +100,6 @@ class Bench:
         self._drift_size = limits * draw.uniform(0.3, 1.0, 6)
         self._drift_rate = 2 * np.pi / draw.uniform(*self.settings.drift_period, 6)
         self._drift_phase = draw.uniform(0.0, 2 * np.pi, 6)
-        _white_noise(seed, np.zeros(1))  # the first noise loads much: now, and not in the thread that sends readings
 
     def mount(self, surface: Surface) -> None:
         """Put a stimulus on the transducer; later strokes rub on it."""

@@ -166,8 +166,10 @@ class Faults:
 
     def _active_fault(self, kind: Kind, time: float) -> Fault | None:
         local = time % self._repeat if self._repeat > 0.0 else time
-        faults = (fault for fault in self._timetable if fault.kind == kind)
-        return next((fault for fault in faults if fault.start <= local < fault.stop), None)
+        for fault in self._timetable:  # a generator would take most of the box's time: a record asks a dozen times
+            if fault.kind == kind and fault.start <= local < fault.stop:
+                return fault
+        return None
 
 
 def _device_clock(timetable: Sequence[Fault], repeat: float) -> tuple[Array, Array] | None:

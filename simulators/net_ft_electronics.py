@@ -208,8 +208,12 @@ class Electronics:
 
     def time(self, tick: int) -> float:
         """Return when the counter reaches `tick`."""
-        age = self._age(self._power_up) + (tick - self._first_tick) / self._ticks_a_second
-        return float(self._faults.instants(np.array([age]))[0])
+        return float(self.times([tick])[0])
+
+    def times(self, ticks: list[int]) -> Array:
+        """Return when the counter reaches each of `ticks`."""
+        ages = self._age(self._power_up) + (np.array(ticks) - self._first_tick) / self._ticks_a_second
+        return self._faults.instants(ages)
 
     def _age(self, time: float) -> float:
         return float(self._faults.device_time(np.array([time]))[0])
@@ -218,8 +222,7 @@ class Electronics:
         """Return counter, status and six counts, packed, at each of `ticks`."""
         if not ticks:
             return []
-        ages = self._age(self._power_up) + (np.array(ticks) - self._first_tick) / self._ticks_a_second
-        times = self._faults.instants(ages)
+        times = self.times(ticks)
         status, counts = self._status_and_counts(times)
         records: list[bytes] = []
         for tick, time, word, six in zip(ticks, times.tolist(), status, counts.tolist(), strict=True):
