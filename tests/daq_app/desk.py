@@ -26,7 +26,7 @@ class Desk:
 
     def begin(self, folder, people="simulated hand"):
         """Open the simulated bench and begin the short session in `folder`."""
-        self.recorder.send(Connect("sim:?seed=7"))
+        self.recorder.send(Connect("sim:?seed=7&rate=100"))
         self.recorder.send(StartSession(SHORT, str(folder), People(people, 7)))
 
     def until(self, kind, number=1):

@@ -59,7 +59,7 @@ def wait_for(poll):
 @pytest.mark.usefixtures("malicious")
 def test_the_recorder_runs_nothing_that_lies_in_the_current_folder():
     with Recorder.start() as recorder:
-        recorder.send(Connect("sim:?seed=7"))
+        recorder.send(Connect("sim:?seed=7&rate=100"))
         ends = (Device, Failed, Gone)
         first = wait_for(lambda: next((r for r in recorder.poll(0.1) if isinstance(r, ends)), None))
     assert isinstance(first, Device)

@@ -14,7 +14,7 @@ def session_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("replay") / "P07"
     protocol = folder.with_name("three.toml")
     protocol.write_text(short_protocol("three", "Three surfaces", [0, 100], [100]))
-    words = ["run", str(protocol), "--device", "sim:?seed=7&rate=200", "--subject", "P07", "--headless"]
+    words = ["run", str(protocol), "--device", "sim:?seed=7&rate=100", "--subject", "P07", "--headless"]
     assert run([*words, "--simulate-subject", "7", "--pace", "50", "--seed", "3", "--out", str(folder), "--json"]) == 0
     assert run(["analyse", str(folder), "--json"]) == 0
     return folder

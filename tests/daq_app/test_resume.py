@@ -36,7 +36,7 @@ def test_a_killed_run_is_resumed_at_the_same_trial_on_the_same_bench_only_and_en
     folder = tmp_path / "P07"
     own = tmp_path / "own.toml"
     own.write_text(OWN)
-    words = ["run", str(own), "--device", "sim:?seed=7", "--subject", "P07", "--headless", "--seed", "3"]
+    words = ["run", str(own), "--device", "sim:?seed=7&rate=100", "--subject", "P07", "--headless", "--seed", "3"]
     people = ["--simulate-subject", "7", "--pace", "20"]
     process = subprocess.Popen(
         [sys.executable, "-m", "daq_app", *words, *people, "--out", str(folder)],
@@ -55,7 +55,7 @@ def test_a_killed_run_is_resumed_at_the_same_trial_on_the_same_bench_only_and_en
     assert before.end["cause"] == "client"
     resume = ["resume", str(folder)]
     assert run([*resume, "--pace", "10"]) == 2
-    assert run([*resume, "--device", "sim:?seed=7&rate=100"]) == 1
+    assert run([*resume, "--device", "sim:?seed=7&rate=200"]) == 1
     assert "readings a second" in capsys.readouterr().err
     assert run([*resume, "--json"]) == 0  # bench, people and pace are those it began with
     assert json.loads(capsys.readouterr().out)["end"]["complete"]

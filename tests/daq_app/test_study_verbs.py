@@ -26,7 +26,7 @@ def study(tmp_path_factory):
     for subject in ("P01", "P02"):
         alone = ["--subject", subject, "--scores-only", "--simulate-subject", "4"]
         assert run([*visit, *alone, "--out", str(folder / f"{subject}_scores")]) == 0
-    with_forces = ["--subject", "P01", "--device", "sim:?seed=5", "--simulate-subject", "4", "--pace", "20"]
+    with_forces = ["--subject", "P01", "--device", "sim:?seed=5&rate=100", "--simulate-subject", "4", "--pace", "20"]
     assert run([*visit, *with_forces, "--out", str(folder / "P01_forces")]) in (0, 3)  # 3: a busy machine lost readings
     return folder
 

@@ -38,7 +38,7 @@ def session_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("recorded") / "P07"
     protocol = folder.with_name("three.toml")
     protocol.write_text(short_protocol("three", "Three surfaces", [0, 100], [100]))
-    words = ["run", str(protocol), "--device", "sim:?seed=7", "--subject", "P07", "--headless"]
+    words = ["run", str(protocol), "--device", "sim:?seed=7&rate=100", "--subject", "P07", "--headless"]
     assert run([*words, "--simulate-subject", "7", "--pace", "20", "--seed", "3", "--out", str(folder), "--json"]) == 0
     return folder
 

@@ -22,8 +22,11 @@ sys.exit(window(sys.argv[1:]))
 """
 
 
-@pytest.mark.parametrize("arguments", [[], [str(SESSION)]], ids=["experimenter", "analyst"])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ("number", "arguments"),
+    [(signal.SIGINT, []), (signal.SIGTERM, []), (signal.SIGTERM, [str(SESSION)])],
+    ids=["Ctrl-C, experimenter", "end, experimenter", "end, analyst"],
+)
 def test_a_signal_closes_the_window_without_a_word(tmp_path, monkeypatch, number, arguments):
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
