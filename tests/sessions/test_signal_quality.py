@@ -23,7 +23,7 @@ from closed_form import (
     wrench,
 )
 
-from sessions.strokes.signal_quality import constant_runs, spikes
+from sessions.strokes.signal_quality import constant_readings, constant_runs, repeated_readings, spikes
 
 T = times(10.0)
 BEGINS = (1.0, 4.0, 7.0)
@@ -110,6 +110,17 @@ def test_a_wild_reading_is_named_before_it_is_filtered_and_stays_raw(readings):
     assert first.mu_static is None
     assert first.peak_tangential == pytest.approx(MU * PRESS.max(), rel=0.02)
     assert all(stroke.flaws == () for stroke in rest)
+
+
+def test_exactly_the_readings_that_repeat_the_first_of_a_frozen_stretch_are_marked():
+    raw, expected = CLEAN.copy(), np.zeros(len(T), bool)
+    raw[400:480], expected[401:480] = raw[400], True
+    assert (repeated_readings(block(T, raw), SETTINGS.signal) == expected).all()
+    column = with_axis(FZ, frozen)
+    runs = constant_runs(T, column, np.zeros(len(T), bool), SETTINGS.signal)
+    inside = np.flatnonzero((T > 1.8) & (T < 2.8))
+    assert [(run.axis, run.clipped, run.first, run.last) for run in runs] == [(FZ, False, inside[0], inside[-1])]
+    assert np.flatnonzero(constant_readings(column, runs, clipped=False)).tolist() == inside[1:].tolist()
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.2, 1.0])
