@@ -17,8 +17,6 @@ from msgspec import inspect
 from sessions.file_access import LARGEST_TEXT, name_failure, read_within_limit
 
 T = TypeVar("T")
-# In the smallest type a screen of 960 by 540 points holds 1,500 letters of any script, and not 2,000 of Japanese.
-LONGEST_TEXT = 1500
 _type_info = cache(inspect.type_info)  # it takes as long as reading a protocol
 
 
@@ -50,24 +48,15 @@ def check_range(key: str, value: float | None, low: float, high: float, unit: st
 
 
 def check_text(key: str, text: str) -> None:
-    """Raise NotAllowed for a text that says nothing, or more than a subject's screen holds."""
+    """Raise NotAllowed for a text that says nothing."""
     if not text.strip():
         raise NotAllowed(key, text, "it must not be empty")
-    check_length(key, text)
-
-
-def check_length(key: str, text: str) -> None:
-    """Raise NotAllowed for a text that is longer than what a subject's screen holds."""
-    allowed = f"it has {len(text):,} letters, and a subject's screen holds {LONGEST_TEXT:,}"
-    check(len(text) <= LONGEST_TEXT, key, f"{text[:40]}…", allowed)
 
 
 def check_scale_ends(ends: tuple[str, str] | None) -> None:
     """Raise NotAllowed where an end of a line has no name; None where there is no line."""
     if ends is not None and not all(end.strip() for end in ends):
         raise NotAllowed("scale_ends", list(ends), "both ends of the scale must be named")
-    for end in ends or ():
-        check_length("scale_ends", end)
 
 
 def load_toml(path: Path, cls: type[T]) -> T:

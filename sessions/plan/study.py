@@ -32,7 +32,7 @@ from sessions.file_access import (
 from sessions.plan.orders import opaque_codes, shuffle
 from sessions.plan.plan import SessionPlan, Trial
 from sessions.plan.protocols.planning import CODE_RULE, Body, StudyPlace, check_body, design_rows, is_code
-from sessions.plan.protocols.protocol import Labels, Protocol
+from sessions.plan.protocols.protocol import Labels, Protocol, new_protocol
 from sessions.toml_file import SettingsError, from_toml
 
 
@@ -215,7 +215,7 @@ def create_study(folder: Path, protocol_text: str, seed: int, *, blinded: bool, 
 
     `source` names the file of the protocol in a sentence on what is wrong with it.
     """
-    protocol = from_toml(protocol_text, Protocol, source)
+    protocol = new_protocol(protocol_text, source)
     check_code("the name of the study's folder", folder.name)
     adaptive = next((block.name for block in protocol.blocks if block.adaptive is not None), None)
     if blinded and adaptive is not None:

@@ -1,14 +1,15 @@
+import re
 from collections import Counter
 from itertools import pairwise
 
 import pytest
-from msgspec import structs
 from protocol_texts import OWN
 
 from sessions.plan.plan import Blinded, Finger, Frame
 from sessions.plan.protocols.planning import Body, StudyPlace, VisitSetting, plan
-from sessions.plan.protocols.protocol import FOLDER, Translation, protocol, protocol_names
-from sessions.toml_file import LONGEST_TEXT, SettingsError
+from sessions.plan.protocols.protocol import FOLDER, LONGEST_TEXT, Protocol, new_protocol, protocol, protocol_names
+from sessions.plan.study import create_study, open_study
+from sessions.toml_file import SettingsError, from_toml
 
 PAPER = "sensotact-friction"
 
@@ -94,16 +95,35 @@ def test_an_unknown_protocol_is_refused_with_the_names_of_those_there_are():
         protocol("nothing-like-it")
 
 
-@pytest.mark.parametrize("key", ["instruction", "question", "scale_ends"])
-def test_a_text_that_no_screen_of_a_subject_holds_is_refused_in_its_own_and_another_language(key):
-    block = protocol(PAPER).blocks[0]
-    text = "a" * (LONGEST_TEXT + 1)
-    value = (text, "very") if key == "scale_ends" else text
-    with pytest.raises(SettingsError, match=r"it has 1,501 letters, and a subject's screen holds 1,500$"):
-        structs.replace(block, **{key: value})
-    with pytest.raises(SettingsError, match=r"1,501 letters"):
-        Translation("de", "stickiness", **{"instruction": "kurz", key: value})
-    assert len(structs.replace(block, instruction="a" * LONGEST_TEXT).instruction) == LONGEST_TEXT
+GERMAN = """[[translations]]
+language = "de"
+block = "softness"
+instruction = "Schieben"
+question = "Wie weich?"
+scale_ends = ["fest", "weich"]
+"""
+
+
+@pytest.mark.parametrize(
+    ("short", "key"),
+    [
+        ("Push your finger once away from you.", "blocks[0].instruction"),
+        ("as soft as can be", "blocks[0].scale_ends"),
+        ("Schieben", "translations[0].instruction"),
+        ("Wie weich?", "translations[0].question"),
+    ],
+)
+def test_a_text_that_no_screen_of_a_subject_holds_is_refused_where_it_is_new_and_read_where_a_study_has_it(
+    short, key, tmp_path, monkeypatch
+):
+    fitting, long = (f"{OWN}{GERMAN}".replace(short, "a" * length) for length in (LONGEST_TEXT, LONGEST_TEXT + 1))
+    assert new_protocol(fitting, "own.toml").name == "own"
+    refusal = re.escape(f"own.toml: {key} has 1,501 letters, and a subject's screen holds 1,500; shorten it")
+    with pytest.raises(SettingsError, match=refusal):
+        create_study(tmp_path / "refused", long, 1, blinded=False, source="own.toml")
+    monkeypatch.setattr("sessions.plan.study.new_protocol", lambda text, where: from_toml(text, Protocol, where))
+    create_study(tmp_path / "former", long, 1, blinded=False)
+    assert open_study(tmp_path / "former").protocol.name == "own"
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 """Protocol: a readable file that says how sessions are run. It is checked before anybody sits down."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise, product
@@ -17,7 +17,6 @@ from sessions.toml_file import (
     NotAllowed,
     SettingsError,
     check,
-    check_length,
     check_range,
     check_scale_ends,
     check_text,
@@ -31,6 +30,8 @@ LEAST_COMPARISONS = 3  # with a standard: two fit any point of subjective equali
 Labels = dict[tuple[str, int], str]  # descriptor and index of a stimulus -> the code on its back
 PRE_EVALUATION = "pre-evaluation"  # the name under which the instruction of that phase is translated
 ENGLISH = "en"
+# In the smallest type a screen of 960 by 540 points holds 1,500 letters of any script, and not 2,000 of Japanese.
+LONGEST_TEXT = 1500  # that the subject reads
 DEEPEST_INDENTATION = 10  # press of the model's finger [mm]
 INDENTATIONS = f"above 0, up to {DEEPEST_INDENTATION} mm"
 
@@ -67,7 +68,6 @@ class BlockOutline(msgspec.Struct, frozen=True):
         check(distinct, "indices", indices, "there must be at least one, and none may come twice")
         check(all(0 <= index <= 100 for index in indices), "indices", indices, "each must lie between 0 and 100")
         check_scale_ends(self.scale_ends)
-        check_length("question", self.question)
         check_range("strokes_allowed", self.strokes_allowed, 1, 20)
         check_range("repetitions", self.repetitions, 1, 20)
         practice, friction = list(self.practice), list(self.simulated_friction)
@@ -111,7 +111,6 @@ class Translation:
         check_language("language", self.language)
         check_text("instruction", self.instruction)
         check_scale_ends(self.scale_ends)
-        check_length("question", self.question)
 
 
 def check_language(key: str, language: str) -> None:
@@ -251,6 +250,17 @@ class Protocol:
         """Return the languages that subjects may read, the protocol's own first."""
         return tuple(dict.fromkeys((self.language, *(texts.language for texts in self.translations))))
 
+    def texts(self) -> Iterator[tuple[str, str]]:
+        """Yield the key of each text that the subject reads, and the text."""
+        for table, parts in (("blocks", self.blocks), ("translations", self.translations)):
+            for number, part in enumerate(parts):
+                yield f"{table}[{number}].instruction", part.instruction
+                yield f"{table}[{number}].question", part.question
+                for end in part.scale_ends or ():
+                    yield f"{table}[{number}].scale_ends", end
+        if self.pre_evaluation is not None:
+            yield "pre_evaluation.instruction", self.pre_evaluation.instruction
+
     def in_language(self, language: str) -> "Protocol":
         """Return the protocol with its texts in a language. Raises NotAllowed where it has none."""
         if language == self.language:
@@ -352,12 +362,21 @@ def protocol(name_or_path: str | Path) -> Protocol:
     Raises SettingsError for an unknown name and for anything wrong in the file, FileNotFoundError for a missing file.
     """
     path = protocol_file(name_or_path)
-    return _protocol_of(text_of(path), str(path))
+    return new_protocol(text_of(path), str(path))
 
 
 @lru_cache  # the window asks for it with each key that is typed
-def _protocol_of(text: str, where: str) -> Protocol:
-    return from_toml(text, Protocol, where)
+def new_protocol(text: str, where: str) -> Protocol:
+    """Return the protocol that a TOML text describes, if a subject's screen holds its texts. Raises SettingsError.
+
+    One that a study holds already is read without this check.
+    """
+    description = from_toml(text, Protocol, where)
+    for key, words in description.texts():
+        if len(words) > LONGEST_TEXT:
+            has = f"has {len(words):,} letters, and a subject's screen holds {LONGEST_TEXT:,}"
+            raise SettingsError(f"{where}: {key} {has}; shorten it")
+    return description
 
 
 def protocol_file(name_or_path: str | Path) -> Path:

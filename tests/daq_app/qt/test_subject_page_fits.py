@@ -13,7 +13,7 @@ from daq_app.qt.answer_fields import FULL, PressBar
 from daq_app.qt.subject_window import LARGER
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 from daq_app.window.subject import SubjectView
-from sessions.toml_file import LONGEST_TEXT
+from sessions.plan.protocols.protocol import LONGEST_TEXT
 from tests.daq_app.qt.written_text import cut_off
 
 pytestmark = pytest.mark.qt
