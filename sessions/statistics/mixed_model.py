@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy import optimize, special
+from scipy import special
 from scipy.linalg import lapack
 
 from drivers.arrays import Array
@@ -78,8 +78,10 @@ class _Likelihood:
 
     def maximum(self, starts: Sequence[Array]) -> Array:
         """Return the numbers (m,) with the greatest likelihood."""
+        from scipy.optimize import minimize  # slow to load, and a session that is opened has no need of it
+
         optima = [
-            optimize.minimize(
+            minimize(
                 self.deviance,
                 start,
                 jac=True,

@@ -21,7 +21,7 @@ from itertools import product
 from operator import itemgetter
 
 import numpy as np
-from scipy import optimize, special
+from scipy import special
 
 from drivers.arrays import Array
 from sessions.statistics.correlations import CONFIDENCE
@@ -177,6 +177,8 @@ class _ProfileLikelihood:
         fallback = None if parameter in (_PSE, _ORDER) else edge
         if value == edge:
             return fallback
+        from scipy.optimize import brentq  # slow to load, and a session that is opened has no need of it
+
         drops = {value: -self.drop}
 
         def drop(trial: float) -> float:
@@ -191,7 +193,7 @@ class _ProfileLikelihood:
         for _ in range(_DOUBLINGS):
             outer = min(inner + step, edge) if sense > 0.0 else max(inner - step, edge)
             if drop(outer) > 0.0:
-                return float(optimize.brentq(drop, inner, outer, xtol=1e-3 * self.scale[parameter]))
+                return float(brentq(drop, inner, outer, xtol=1e-3 * self.scale[parameter]))
             if outer == edge:
                 break
             inner, step = outer, 2.0 * step
@@ -201,6 +203,8 @@ class _ProfileLikelihood:
         self, fixed: dict[int, float], start: Array, precision: float = _ENOUGH, *, adjusted: bool = False
     ) -> tuple[Array, float]:
         """Return the best parameters with some held, and their log likelihood, or their adjusted one."""
+        from scipy.optimize import minimize  # likewise
+
         bounds = [(fixed[n], fixed[n]) if n in fixed else pair for n, pair in enumerate(self.bounds)]
         low, high = np.array(bounds).T / self.scale
         start = np.clip(start / self.scale, low, high)
@@ -213,7 +217,7 @@ class _ProfileLikelihood:
             slope[_SCATTER] += theta_slope
             return -value - adjustment, -slope * self.scale
 
-        optimum = optimize.minimize(
+        optimum = minimize(
             loss, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": precision, "gtol": 1e-9}
         )
         return np.asarray(optimum.x, np.float64) * self.scale, -float(optimum.fun)

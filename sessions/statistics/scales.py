@@ -24,7 +24,6 @@ from typing import Literal
 
 import numpy as np
 from scipy import special
-from scipy.sparse import csgraph
 
 from drivers.arrays import Array
 from sessions.statistics.correlations import LEAST_CASES, jackknife
@@ -135,9 +134,11 @@ def _counts(choices: Sequence[Choice], indices: Sequence[int], subjects: Sequenc
 
 def _no_scale(counts: Array, indices: Sequence[int]) -> str:
     """Return why there are no values, "" where they are finite (Ford 1957, Am. Math. Mon. 64(8), 28)."""
+    from scipy.sparse.csgraph import connected_components  # slow to load, and an opened session has no need of it
+
     meetings, wins = counts
     beaten = wins + (meetings - wins).T  # [a, b]: how often a was chosen and b was not
-    groups, label = csgraph.connected_components(beaten > 0, directed=True, connection="strong")
+    groups, label = connected_components(beaten > 0, directed=True, connection="strong")
     if groups > 1:
         unbeaten = next(group for group in range(groups) if not (beaten[label != group][:, label == group] > 0).any())
         names = ", ".join(str(index) for index, group in zip(indices, label, strict=True) if group == unbeaten)
