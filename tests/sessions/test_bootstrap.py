@@ -8,7 +8,7 @@ import pytest
 import test_ground_truth as ground_truth
 from closed_form import GAINS_ALONE, PLAIN, T, analyse, block, noisy
 
-from sessions.strokes.bootstrap import BootstrapSettings, stroke_intervals
+from sessions.strokes.bootstrap import BootstrapSettings, mean_inflation, stroke_intervals
 from sessions.strokes.contacts import onset_draws
 from sessions.strokes.stroke import StrokeCurve
 from simulators.bench import BenchSettings
@@ -112,6 +112,23 @@ def test_an_instant_that_a_person_decided_has_no_interval(strokes):
     deciders = dict.fromkeys(("onset", "stick", "slide_onset"), "by E02")
     intervals = stroke_intervals(replace(sticking, decided=deciders), 0)
     assert (intervals.onset, intervals.break_away, intervals.slide_onset) == (None, None, None)
+
+
+@pytest.mark.parametrize(
+    ("blocks", "correlation"),
+    [
+        ([0.0, 0.0, 1.0, 1.0] * 2, 0.5),  # 1/8 between neighbours; less its bias in eight, (1/8 + 1/8) / (1 - 4/8)
+        ([0.0, 1.0, 0.0, 0.0, 1.0], 0.0),  # five that hardly have a neighbour alike
+        ([0.0, 1.0] * 4, 0.0),  # those that alternate are taken to be independent
+        ([0.0, 0.0, 1.0, 1.0], 0.8),  # four say nothing of how alike they are
+        (np.arange(20.0), 0.8),
+    ],
+)
+def test_the_mean_of_few_alike_blocks_strays_as_an_autoregression_does(blocks, correlation):
+    inflation, dof = mean_inflation(np.asarray(blocks), BootstrapSettings())
+    independent = (1.0 - correlation) / (1.0 + correlation)
+    assert inflation == pytest.approx(independent**-0.5)
+    assert dof == pytest.approx(max(len(blocks) * independent - 1.0, 2.0))
 
 
 def test_of_a_force_without_noise_the_onset_lies_anywhere_between_two_readings():
