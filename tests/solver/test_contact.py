@@ -17,6 +17,32 @@ from solver.mesh import block
 RADIUS = 5.0
 
 
+def test_a_part_of_the_way_to_a_load_is_that_part_of_the_way_of_each_quantity():
+    begin, end = LoadState(1.0, 0.2, 0.04, 0, 3.0), LoadState(2.0, 0.6, 0.08, 1, -1.0)
+    assert begin.towards(end, 0.25) == pytest.approx((1.25, 0.3, 0.05, 1, 2.0))
+    assert begin.towards(end, 1.0) == end
+    assert begin._replace(tau=np.inf).towards(end, 0.25).tau == 0.08  # taken whole
+    assert begin.towards(end._replace(tau=np.inf), 0.25).tau == np.inf
+    pull = ForceLoad(0.1, None, 2.0).towards(ForceLoad(0.3, 0.08, 6.0), 0.25)
+    assert pull == pytest.approx((0.15, 0.02, 3.0))
+    assert ForceLoad(0.1, 0.04).towards(ForceLoad(0.3, 0.08), 0.5).tangential == pytest.approx(0.06)
+    assert ForceLoad(0.1, 0.04).towards(ForceLoad(0.3, None), 0.5).tangential is None
+
+
+@pytest.mark.parametrize(
+    ("load", "frictionless", "path_dependent"),
+    [
+        (LoadState(1.0, 0.0), True, False),
+        (LoadState(1.0, 0.3, 0.0), True, False),
+        (LoadState(1.0, 0.3), False, True),
+        (LoadState(1.0, 0.3, sense=1), False, False),
+        (LoadState(1.0, 0.3, 0.01), False, True),
+    ],
+)
+def test_only_a_slide_and_a_press_without_friction_depend_on_no_path(load, frictionless, path_dependent):
+    assert (load.frictionless, load.path_dependent) == (frictionless, path_dependent)
+
+
 def cylinder(half_width: float, finest: float, nu: float = 0.48, zone: float = 0.9) -> LinearBody:
     """A soft round body, wide and deep against its contact, fine where it touches."""
     steps = [0.0]
