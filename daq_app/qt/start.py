@@ -7,6 +7,7 @@ import signal
 import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -57,7 +58,8 @@ def window(arguments: list[str]) -> int:
         return _fail(str(error))
     if folder is None:
         return _show_window(
-            lambda application: open_window(application, tablet=_tablet(options.subject_address) if web else None)
+            lambda application: open_window(application, tablet=_tablet(options.subject_address) if web else None),
+            ("daq_app.recorder.client", "daq_app.tablet.server", "daq_app.window.state"),
         )
     if not folder.is_dir():
         return _fail(f"{folder} is no folder: give a session's folder")
@@ -74,7 +76,7 @@ def window(arguments: list[str]) -> int:
         resize_to_hint(window)
         return window
 
-    return _show_window(analyst)
+    return _show_window(analyst, ("daq_app.analyst.state",))
 
 
 def command_line() -> Parser:
@@ -154,10 +156,12 @@ def _tablet(address: str | None) -> "TabletScreen":
     return TabletScreen(address, PORT)
 
 
-def _show_window(build: "Callable[[QApplication], QWidget]") -> int:
-    """Show the window that is made until it is closed; return the exit code, or say what is missing."""
+def _show_window(build: "Callable[[QApplication], QWidget]", modules: tuple[str, ...] = ()) -> int:
+    """Show the window that is made of `modules` until it is closed; return the exit code, or say what is missing."""
     if problem := what_is_missing():
         return _fail(problem)
+    for module in modules:  # before Qt's, for PySide reads the source of every module that is loaded after it
+        import_module(module)
     try:
         from PySide6.QtCore import QTimer
         from PySide6.QtWidgets import QApplication
