@@ -212,7 +212,8 @@ class _Places:
         self.picture("04-mount")
         self.picture("05-subject-instruction", self.subject)
         model = self.window.live._model
-        self.wait(lambda: model.provisional is not None)
+        # The model answers readings: one more at a time, until it is ready.
+        self.wait(lambda: model.provisional or self.recorder.readings((self.recorder._last + 1) / RATE))
         self.play(steps.StartTake(1, 1), steps.MeasureZero(), until=4.0)
         self.recorder.stroke(1, 4.0)
         self.play(steps.AskStroke(trial), until=5.0)

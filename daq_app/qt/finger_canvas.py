@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QFrame, QSizePolicy
 
 from daq_app.analyst.frame import FIELD_CHOICES, Frame, Line, View, probe_text
 from daq_app.qt.finger_painter import FingerPainter, Look, whole_box
+from daq_app.qt.parts import breakable
 from daq_app.qt.plots import name_axis, pg, style_axis
 from daq_app.qt.tokens import SMALL, Tokens, font, px
 from daq_app.wording import tr, tr_noop
@@ -137,7 +138,9 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
             picture.paint(self.look, self._shades[self.look.field.signed], self.sight.line)
         painter.setPen(QColor(self._tokens.quiet))
         caption_box = QRectF(4.0, 0.0, self.width() - 8.0, self._above())
-        painter.drawText(caption_box, int(Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap), self._caption)
+        painter.drawText(
+            caption_box, int(Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap), breakable(self._caption)
+        )
 
     def paintEvent(self, event: QPaintEvent) -> None:
         pg.GraphicsLayoutWidget.paintEvent(self, event)
@@ -228,7 +231,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
     def _height_of(self, text: str) -> float:
         """Return the height of words that are as wide as the canvas [pixel]."""
         box = QRectF(0.0, 0.0, self.width() - 8.0, 1.0)
-        return QFontMetricsF(self._font).boundingRect(box, int(Qt.TextFlag.TextWordWrap), text).height()
+        return QFontMetricsF(self._font).boundingRect(box, int(Qt.TextFlag.TextWordWrap), breakable(text)).height()
 
     def _colour_bar(self) -> Any:  # noqa: ANN401  pyqtgraph has no types
         pens = {"pen": self._tokens.text, "hoverPen": self._tokens.act, "hoverBrush": f"{self._tokens.act}80"}

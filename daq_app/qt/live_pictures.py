@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from daq_app.analyst.frame import View
 from daq_app.qt.painting import PaintedWidget, blank, draw_line, fill_faces, fine, lines, mark_failed_solve, paint_arrow
+from daq_app.qt.parts import breakable
 from daq_app.qt.tokens import MODEL, MU, SMALL, font, theme_of
 from daq_app.window.live_model import ModelText, Picture
 from daq_app.window.live_trace import PlotScale
@@ -166,8 +167,8 @@ class FingerView(QWidget):
         painter.setPen(QColor(t.look if self._text.state in ("instead", "beyond", "failed") else t.quiet))
         flags = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignTop)
         box = QRectF(4, 0, self.width() - 8, self.height())
-        height = painter.boundingRect(box, flags, self._text.text).height()
-        painter.drawText(box, flags, self._text.text)
+        height = painter.boundingRect(box, flags, words := breakable(self._text.text)).height()
+        painter.drawText(box, flags, words)
         # Three lines are always left to them, so that the picture stays where it is; a failure takes what it needs.
         line = painter.fontMetrics().height()
         top = max(height, 3.0 * line) + 4

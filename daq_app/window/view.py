@@ -231,7 +231,7 @@ def _drift(bench: BenchState) -> str:
 
 
 def _devices(bench: BenchState) -> tuple[tuple[str, str], ...]:
-    rows = [("sim:", f"{tr('Simulated bench')} · {tr('always there')}")]
+    rows = [("sim:", tr("Simulated bench"))]
     for device in bench.devices:
         if (info := device.info) is not None:
             detail = tr("serial {serial} · {source}", serial=info.serial, source=info.calibration.source)
