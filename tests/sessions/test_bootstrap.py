@@ -85,26 +85,38 @@ def test_the_instants_of_a_held_finger_have_intervals_and_the_direction_is_sure(
             assert stroke.break_away < intervals.slide_onset[1]
 
 
-def test_a_movement_nearly_across_leaves_its_sign_in_doubt():
+def oblique(degrees, noise):
+    """Return a stroke at an angle to the x axis whose centre of pressure has white noise [mm]."""
     rng, t = np.random.default_rng(0), np.arange(400) / 200.0
-    way = np.array([0.5, np.sqrt(0.75)])  # at 60 degrees: as far along x as the analysis asks for
-    position = 25.0 * t[:, None] * way + rng.normal(0.0, 0.3, (400, 2))
+    way = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
+    position = 25.0 * t[:, None] * way + rng.normal(0.0, noise, (400, 2))
     full = np.ones(400)
     columns = (t, 2.0 * full, 2.0 * full, full, np.outer(full, way), 0.5 * full, position, 25.0 * full)
-    curve = StrokeCurve(*columns, noise=(0.0, 0.0), quiet=0.0)
-    crossing = replace(
+    return replace(
         ground_truth.visit(1).analyse().strokes[0],
-        curve=curve,
+        curve=StrokeCurve(*columns, noise=(0.0, 0.0), quiet=0.0),
         onset=None,
         steady=(0.0, 1.99),
         direction=1,
-        heading=60.0,
+        heading=degrees,
+        zero_drift=0.0,
         break_away=None,
         slide_onset=None,
     )
-    intervals = stroke_intervals(crossing, 0)
+
+
+def test_a_movement_nearly_across_leaves_its_sign_in_doubt():
+    intervals = stroke_intervals(oblique(60.0, 0.3), 0)  # as far along x as the analysis asks for
     assert intervals.heading[0] < 60.0 < intervals.heading[1]
     assert 0.2 < intervals.direction_agrees < 0.8
+
+
+@pytest.mark.parametrize("degrees", [45.0, 15.0])
+def test_of_a_calibration_alone_a_heading_has_the_closed_form(degrees):
+    intervals = stroke_intervals(oblique(degrees, 0.0), 0, GAINS_ALONE)
+    ratio = np.sqrt(2.0) * 0.02  # of the gains of two torques, of tan: d(angle) = sin(2 angle) / 2 d(log tan)
+    half = np.degrees(1.95996 * ratio * np.sin(2.0 * np.radians(degrees)) / 2.0)
+    assert width(intervals.heading) == pytest.approx(2.0 * half, rel=0.02)
 
 
 def test_an_instant_that_a_person_decided_has_no_interval(strokes):
