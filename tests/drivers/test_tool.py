@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calibration_files import GAMMA, NANO43, parse
+from scipy.spatial.transform import Rotation
 
 from daq_app.simulation.wiring import connect
 from drivers.address import parse_address, with_tool, without_tool
@@ -47,6 +48,15 @@ def test_turns_follow_each_other_about_x_then_y_then_z():
     raw = np.linalg.solve(CALIBRATION.matrix, [1.0, 2.0, 3.0, 10.0, 20.0, 30.0])[None]
     # About x by 90 degrees: new y is old z, new z is old -y. Then about the new z: newest x is new y, newest y new -x.
     np.testing.assert_allclose(calibration.wrench(raw, np.zeros(6))[0], [3, -1, -2, 30, -10, -20], atol=1e-9)
+
+
+def test_three_turns_are_those_of_axes_that_turn_with_the_tool():
+    angles, wrench = (20.0, -35.0, 50.0), np.array([1.0, 2.0, 3.0, 10.0, 20.0, 30.0])
+    calibration = info_with("net-ft://box?tool=0,0,0,20,-35,50").calibration
+    raw = np.linalg.solve(CALIBRATION.matrix, wrench)[None]
+    turned = Rotation.from_euler("XYZ", angles, degrees=True).inv()  # capitals: about the axes that turn
+    expected = np.concatenate([turned.apply(wrench[:3]), turned.apply(wrench[3:])])
+    np.testing.assert_allclose(calibration.wrench(raw, np.zeros(6))[0], expected, atol=1e-9)
 
 
 def test_the_makers_own_transform_given_as_a_tool_gives_the_makers_own_product():

@@ -7,6 +7,8 @@ import pytest
 from scipy.integrate import quad
 
 from solver import Friction, Loading, Material, Materials, Relaxation, Scene, Solve, solve
+from solver.accuracy.residual_overstress import relaxing_scene
+from solver.equilibrium.finger import settled_moduli
 
 SLIDE = Scene(friction=Friction(0.3), loading=Loading(1.0, "+x"), solve=Solve(evidence="quick"))
 
@@ -42,6 +44,14 @@ def test_a_slide_that_slips_throughout_forgets_its_history(prediction):
     assert estimate(prediction, "history") == 0.0
     press = solve(replace(SLIDE, loading=Loading(1.0, "none")))
     assert press.model["left_out"]["history"]["how"] == "the history was marched"
+
+
+def test_tissue_that_is_taken_to_relax_comes_to_rest_with_the_moduli_of_the_scene():
+    rest = settled_moduli(relaxing_scene(SLIDE).materials)
+    for moduli, expected in zip(rest, settled_moduli(SLIDE.materials), strict=True):
+        assert (moduli.shear, moduli.lame) == pytest.approx((expected.shear, expected.lame))
+    compressible = Materials(Material(0.136, 0.1), SLIDE.materials.dermis, SLIDE.materials.fat)
+    assert relaxing_scene(replace(SLIDE, materials=compressible)) is None  # of auxetic tissue at once
 
 
 def test_relaxing_tissue_keeps_the_overstress_of_a_press_of_a_second_and_the_slide():

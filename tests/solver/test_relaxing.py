@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import Material, Materials, Relaxation, Solve, solve
+from solver import Friction, Loading, Material, Materials, Relaxation, Scene, Solve, solve
 from solver.body import Probes
 from solver.constitutive import Prony
 from solver.equilibrium import relaxation as relaxing
@@ -68,6 +68,17 @@ def test_a_block_pressed_between_walls_keeps_its_bulk_stress_and_relaxes_by_its_
     for time, part in zip(TIMES, TABLE[1.0], strict=True):
         expected = -0.01 * (law.bulk * min(time, 1.0) + 4.0 / 3.0 * law.shear * part)
         np.testing.assert_allclose(stresses[time][:, 1, 1], expected, rtol=1e-6)
+
+
+def test_a_light_press_relaxes_alike_at_small_and_at_finite_strain():
+    tissue = Material(0.08, 0.2, prony=(Relaxation(0.6, 0.5),))
+    press = Scene(materials=Materials(tissue, tissue, tissue), friction=Friction(0.0), loading=Loading(0.05, "none"))
+    forces = []
+    for kinematics in ("small", "finite"):
+        history = solve(replace(press, solve=Solve(kinematics, "history", 0.02, "quick"))).history
+        forces.append(np.interp([0.5, 1.0, 2.0], history.time, history.normal_force))
+    assert forces[0][1] > 1.3 * forces[0][2]  # it relaxes by far more than what both may differ by
+    np.testing.assert_allclose(*forces, rtol=2e-3)
 
 
 def test_a_body_is_kept_ready_for_the_last_few_lengths_of_steps_and_makes_the_others_anew(monkeypatch):

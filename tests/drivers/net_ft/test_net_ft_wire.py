@@ -6,7 +6,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.calibration import Calibration
-from drivers.net_ft.wire import AXIA, NET_FT, RECORD, START, STOP, decode
+from drivers.net_ft.wire import (
+    AXIA,
+    NET_FT,
+    RECORD,
+    START,
+    STOP,
+    Units,
+    decode,
+    is_latched,
+    parse_units,
+    parse_wrench,
+)
 from drivers.transducer import TransducerInfo
 from sessions.recording.head import info_from_dict, info_to_dict
 
@@ -22,6 +33,30 @@ def test_a_record_typed_by_hand_is_read():
     (record,) = decode([RECORD_BYTES]).records
     assert (record["number"], record["counter"], record["status"]) == (1, 35, 0)
     assert record["counts"].tolist() == [1_000_000, -2_000_000, 5_000_000, 125_000, -1, 0]
+
+
+WRENCH = bytes.fromhex("1234 8001 0001 FFFF 7FFF 8000 0000 000A")
+UNITS = bytes.fromhex("1234 02 03 000F4240 000003E8 05DC 05DC 05DC 000A 000A 000B")
+
+
+def test_answers_of_the_command_port_typed_by_hand_are_read():
+    assert parse_wrench(WRENCH) == (1, -1, 32767, -32768, 0, 10)
+    assert parse_units(UNITS) == Units(1_000_000, 1_000, (1500, 1500, 1500, 10, 10, 11))
+    assert [is_latched(WRENCH[:2] + word + WRENCH[4:]) for word in (b"\x80\x01", b"\x80\x02", b"\x00\x00")] == [
+        True, False, False
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("parse", "answer"), [(parse_wrench, WRENCH), (parse_units, UNITS)], ids=["wrench", "units"])
+@pytest.mark.parametrize("damage", ["shorter", "longer", "first byte", "second byte"])
+def test_what_has_another_length_or_header_is_no_answer(parse, answer, damage):
+    spoilt = {
+        "shorter": answer[:-1],
+        "longer": answer + b"\x00",
+        "first byte": b"\x13" + answer[1:],
+        "second byte": answer[:1] + b"\x35" + answer[2:],
+    }
+    assert parse(spoilt[damage]) is None
 
 
 def test_extremes_of_every_field_are_read():
