@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.clock_recovery import GAP, ClockRecovery
+from drivers.clock_recovery import GAP, ClockRecovery, ScanCount
 
 START = 5_000_000_000
 
@@ -122,3 +122,13 @@ def test_numbers_and_times_always_rise_and_every_missing_number_is_counted(pause
     if record_count:
         assert sequence[0] == 1
         assert sequence[-1] - record_count == recovery.lost
+
+
+def test_scans_lie_at_even_times_of_the_converters_clock_and_a_gap_is_as_many_as_its_time_holds():
+    count = ScanCount(500.0)
+    first = count.take(np.array([0, 0, 2]), 20_000_000)
+    assert (first.sequence.tolist(), first.time.tolist(), count.lost) == ([1, 2, 5], [0.0, 0.002, 0.008], 2)
+    count.bridge(1_020_000_000)  # a second later: 500 scans, of which the last is the next
+    after = count.take(np.array([0]), 1_020_000_000)
+    assert (after.sequence.tolist(), after.time.tolist(), count.lost) == ([505], [1.008], 501)
+    assert not len(count.take(np.array([], np.int64), 2_000_000_000).sequence)
