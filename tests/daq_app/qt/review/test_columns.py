@@ -396,7 +396,7 @@ def test_the_window_fits_every_screen_and_nothing_is_laid_over_anything_else(app
 
 def test_a_session_opened_by_its_verb_shows_three_columns_where_the_screen_has_room(application, monkeypatch):
     windows = []
-    monkeypatch.setattr(start, "_show_window", lambda create: windows.append(create(application)) or 0)
+    monkeypatch.setattr(start, "_show_window", lambda create, _: windows.append(create(application)) or 0)
     monkeypatch.setattr("daq_app.qt.analyst_window.Analyst", lambda _: Nobody())
     start.window([str(SESSION)])
     (window,) = windows
