@@ -251,7 +251,7 @@ def test_a_client_that_fetches_nothing_holds_up_nothing(tmp_path):
         [sys.executable, "-m", "daq_app.recorder", "20"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
     codec = Codec(REQUESTS)
-    recorder.stdin.write(codec.encode(Connect("sim:?seed=7&rate=100")))
+    recorder.stdin.write(codec.encode(Connect("sim:?seed=7")))
     recorder.stdin.write(codec.encode(StartSession(SHORT, str(folder), People("simulated people", 7))))
     recorder.stdin.flush()
     deadline = time.monotonic() + 2 * DEADLINE
