@@ -19,8 +19,8 @@ from simulators.simulator import LINE_FAULTS, ServedBox, Simulator, serve_on_por
 HOST = "127.0.0.1"
 _BURST = 200  # records sent at one go after the computer was busy, so as not to drown the reader
 _NAP = 0.02  # longest wait, and so for an end [real s]
-# Records due within it leave together [real s]. A recorder at 2 kHz takes 33 % of a busy core with half of it, 24 %
-# with it, and 18 % with twice as much.
+# Records due within it leave together [real s]. With half of it a recorder at 2 kHz takes about a third more of a
+# core, with twice as much about a quarter less (single runs on a busy machine).
 _SHORTEST_NAP = 0.004
 
 
