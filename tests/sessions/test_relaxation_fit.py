@@ -8,7 +8,7 @@ from finger_presses import PUBLISHED, SPREAD, law, power_law, power_law_model, p
 
 from sessions.prediction.finger_fit import LoadingCurve, fit
 from sessions.prediction.press_model import FitError
-from sessions.prediction.relaxation_fit import HoldCurve, relaxation, relaxing_fit
+from sessions.prediction.relaxation_fit import BLOCK, HoldCurve, relaxation, relaxing_fit
 from solver import Friction, Loading, Relaxation, Solve, solve
 
 RATE, DEEP = 200.0, 1.5  # [Hz], [mm]
@@ -74,6 +74,30 @@ def test_a_finger_that_relaxes_on_its_way_down_is_as_stiff_as_at_once_and_not_be
     layers = zip(naive.layers, PUBLISHED, strict=True)
     assert not all(item.stiffness.low <= true <= item.stiffness.high for item, true in layers)
     assert holds[0].fall > 0.05
+
+
+def test_a_press_without_its_relaxation_is_the_elastic_one_that_the_convolution_was_made_of():
+    rng = np.random.default_rng(6)
+    time, unrelaxed = (
+        np.cumsum(rng.uniform(0.02, 0.2, 40)),
+        np.concatenate([[0.0], np.cumsum(rng.uniform(-0.1, 0.3, 39))]),
+    )
+    part, tau = 0.4, 0.7
+    rate = np.diff(unrelaxed) / np.diff(time)
+
+    def memory(now):  # of one spring and dashpot: the integral of exp(-(now - s) / tau) over what the force grew
+        ends = np.minimum(time, now)
+        return np.sum(rate * tau * np.diff(np.exp((ends - now) / tau)))
+
+    force = (1.0 - part) * unrelaxed + part * np.array([memory(now) for now in time])
+    press = HoldCurve(time, np.zeros(40), force)
+    assert press.unrelaxed(part, tau).force == pytest.approx(unrelaxed, abs=1e-12)
+
+
+def test_the_fall_of_a_held_force_is_that_of_the_means_over_its_blocks():
+    time = np.append(0.0, np.arange(1.0, 80.0) * BLOCK / 4.0 + 0.001)  # beside the bounds of blocks
+    force = np.where(time < 0.5, 2.0, 1.5) + np.tile([0.3, -0.3], len(time) // 2)  # within a block it cancels
+    assert HoldCurve(time, np.zeros(len(time)), force).fall == pytest.approx(0.25)
 
 
 def test_a_finger_that_does_not_relax_is_not_said_to(model, elastic):
