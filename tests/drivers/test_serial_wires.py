@@ -1,6 +1,7 @@
 """What the drivers on serial lines do beyond what every driver does (test_driver_contract), over real ports."""
 
 import os
+import re
 import threading
 from dataclasses import dataclass
 from pathlib import Path
@@ -222,6 +223,8 @@ def test_the_bias_of_a_controller_is_dropped_so_that_raw_stays_raw():
     device.bench.mount(paper_surfaces()["stickiness", 80])
     device.box._biases.append(np.full(6, 5.0))
     transducer = device.open()
+    newtons, newton_metres = (float(re.search(rf"{name}=([\d.]+)", device.uri)[1]) for name in ("range_N", "range_Nm"))
+    assert transducer.info.calibration.rated == pytest.approx([newtons] * 3 + [1000.0 * newton_metres] * 3)
     transducer.start()
     block = readings(device, transducer, device.box.now() + 0.5)
     transducer.close()
