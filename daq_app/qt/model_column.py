@@ -24,6 +24,7 @@ from solver.quantities import SED
 
 FINGER, SESSION, _COMPARISON = range(3)  # tabs
 COMPARISON_NAME = "compared"  # of the picture of two sessions, to the work
+_MARGINS = GRID // 2, GRID, GRID // 2, GRID  # of a tab [px]: with more at the sides three columns need over 1440
 STEPS_A_SECOND = 10.0  # of a history that plays: it counts steps, for pressing takes long and sliding little time
 
 
@@ -75,7 +76,7 @@ class ModelColumn(QWidget):
         self.comparison = ComparedView(self._compare, self._save)
         self.scene = TextTable(tr("scene and model"), (tr("of the model"), tr("value"), tr("remark")))
         session = QWidget()
-        vbox(self.picture_choice, self.session_errors, (self.picture, 1), on=session, margins=GRID)
+        vbox(self.picture_choice, self.session_errors, (self.picture, 1), on=session, margins=_MARGINS)
         self.tabs = QTabWidget()
         self.tabs.setAccessibleName(tr("pictures"))
         self.tabs.addTab(self._finger_page(), tr("Finger"))
@@ -249,5 +250,5 @@ class ModelColumn(QWidget):
         fingers, play = hbox((self.finger, 1), (self.compared_finger, 1)), hbox((self.player, 1), self.film)
         acts = hbox(self.near, self.mesh, self.together, self.history, (self.save, 1))
         plots = (fingers, 3), self.probe, (self.plot, 1)
-        vbox(self.fields, *plots, self.errors, self.failure_label, play, acts, on=page, margins=GRID)
+        vbox(self.fields, *plots, self.errors, self.failure_label, play, acts, on=page, margins=_MARGINS)
         return page
