@@ -150,7 +150,7 @@ def inside_out(checks: Mapping[str, float]) -> str:
     if checks["smallest_det_F"] > 0.0:
         return ""
     return (
-        f"Tissue is turned inside out somewhere (a volume of −{-checks['smallest_det_F']:.2g} of what it was): no "
+        f"Tissue is turned inside out somewhere (a volume of −{abs(checks['smallest_det_F']):.2g} of what it was): no "
         "finger can be pressed or dragged so far, and the numbers are those of a formula beyond its range."
     )
 

@@ -127,7 +127,7 @@ def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> 
         near: EquilibriumState | None = None
         for number in group:
             with suppress(SolveFailure):
-                near = _rough_state(finger, scenes[number], near)
+                near = _sound_state(finger, scenes[number], near)
                 states[number] = near
         if states:
             row = finger.endings(np.asarray(arcs, np.float64))
@@ -135,7 +135,7 @@ def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> 
     return out
 
 
-def _rough_state(finger: Finger[Any], scene: Scene, near: EquilibriumState | None) -> EquilibriumState:
+def _sound_state(finger: Finger[Any], scene: Scene, near: EquilibriumState | None) -> EquilibriumState:
     """Return the settled slide, at finite strain sought from `near`. Raises SolveFailure, also where it is unsound."""
     if isinstance(finger, FiniteFinger):
         state = rough_state(finger, scene, near)

@@ -16,7 +16,7 @@ from daq_app.analyst.session_words import condition, lineage, numbers, points
 from daq_app.analyst.state import rows, selected_row
 from daq_app.analyst.stroke import EDGES
 from daq_app.qt import preferences, start
-from daq_app.qt.analyst_window import AnalystWindow, LineageLabel
+from daq_app.qt.analyst_window import AnalystWindow
 from daq_app.qt.stroke_column import AUTHOR, DecisionsBar
 from daq_app.qt.tokens import LIGHT
 from sessions.report.contents import Fact
@@ -301,41 +301,6 @@ def test_readings_are_replayed_with_play_pause_speed_seek_and_step(window):
     assert len(view._raw_curves[0].getData()[0]) == 50
 
 
-def test_the_way_back_takes_two_rows_in_half_a_small_screen_and_no_link_is_broken(window):
-    way = LineageLabel()
-    way.show_links(lineage(window.state))
-    assert way.heightForWidth(660) <= 2.5 * way.fontMetrics().lineSpacing()
-    links = re.findall(">([^<]+)</a>", way.text())
-    assert len(links) == 6
-    assert not any(" " in link for link in links)
-
-
-def test_every_link_of_the_way_back_is_followed_by_keys(application, window):
-    way = LineageLabel()
-    way.show_links(lineage(window.state))
-    way.show()
-    way.activateWindow()
-    way.setFocus()
-    application.processEvents()
-    links = []
-    way.followed.connect(links.append)
-    for _ in range(6):
-        QTest.keyClick(way, Qt.Key.Key_Tab)
-        QTest.keyClick(way, Qt.Key.Key_Return)
-    way.close()
-    assert links == ["session", "trial", "prediction", "friction", "window", "readings"]
-
-
-def test_the_way_back_ends_at_the_first_raw_reading_of_the_steady_window(window):
-    stroke = selected_row(window.state).stroke
-    window.take(m.Excerpt(stroke.number, raw(stroke)))
-    window._follow("readings")
-    table = window.stroke.readings.table
-    row = table.currentIndex().row()
-    assert [table.model().index(at, 0).data() for at in (row - 1, row)] == ["", "steady"]
-    assert table.model().index(row, 1).data() == str(row + 7)
-
-
 def test_a_second_session_is_shown_beside_the_first(window):
     window.take(m.OtherSession("other", example()))
     table = window.model.comparison.table
@@ -392,6 +357,13 @@ def test_the_window_fits_every_screen_and_nothing_is_laid_over_anything_else(app
         assert window.progress.isVisible()
         assert laid_over(window, parts) == []
         window.take(m.Idle())
+
+
+def test_at_the_size_it_asks_for_the_window_shows_three_columns(application, window):
+    window.resize(window.sizeHint())
+    application.processEvents()
+    assert not window._pages.isVisible()
+    assert all(column.isVisible() for column in window._columns.values())
 
 
 def test_a_session_opened_by_its_verb_shows_three_columns_where_the_screen_has_room(application, monkeypatch):
