@@ -42,6 +42,11 @@ class Node:
     pass
 
 
+def test_objects_in_a_cycle_do_not_stop_a_window_that_lets_go_of_a_signal(monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    subprocess.run([sys.executable, "-c", DISCONNECTING], check=True, timeout=60)
+
+
 def test_a_widget_in_a_cycle_is_deleted_between_two_events_and_not_before(driver):
     node = Node()
     node.self, node.widget = node, QWidget()
@@ -51,8 +56,3 @@ def test_a_widget_in_a_cycle_is_deleted_between_two_events_and_not_before(driver
         [[] for _ in range(10 * gc.get_threshold()[0])]
     assert widget() is not None
     driver.until(lambda: [[] for _ in range(1_000)] and widget() is None, "its end")
-
-
-def test_objects_in_a_cycle_do_not_stop_a_window_that_lets_go_of_a_signal(monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    subprocess.run([sys.executable, "-c", DISCONNECTING], check=True, timeout=60)
