@@ -11,6 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
+from weakref import WeakMethod
 
 from daq_app.console import FAILED, STOPPED, WRONG, NotWritten, Parser, WrongValue
 from daq_app.wording import VARIABLE
@@ -137,10 +138,13 @@ def open_window(
     if theme is None:
         application.styleHints().colorSchemeChanged.connect(follow_theme)
 
+    # Python keeps its hook to the very end; a bridge that it kept would be disconnected there, which crashes PySide.
+    report = WeakMethod(bridge.report_drawing_failure)
+
     def show_error(_type: type[BaseException], error: BaseException, _trace: TracebackType | None) -> None:
         """Say what went wrong in the window, which goes on: an error of ours there never stops a recording."""
-        if isinstance(error, Exception):
-            bridge.report_drawing_failure(error)
+        if isinstance(error, Exception) and (report_failure := report()) is not None:
+            report_failure(error)
 
     sys.excepthook = show_error
     if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:  # from now on Ctrl-C in a terminal ends no session

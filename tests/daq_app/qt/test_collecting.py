@@ -6,8 +6,11 @@ import sys
 import weakref
 
 import pytest
+from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QWidget
 from x11_desk import ROOT
+
+from daq_app.qt.start import open_window
 
 pytestmark = pytest.mark.qt
 
@@ -42,6 +45,14 @@ class Node:
     pass
 
 
+class SilentRecorder:
+    def send(self, request):
+        pass
+
+    def close(self):
+        pass
+
+
 def test_objects_in_a_cycle_do_not_stop_a_window_that_lets_go_of_a_signal(monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     subprocess.run([sys.executable, "-c", DISCONNECTING], check=True, timeout=60)
@@ -56,3 +67,16 @@ def test_a_widget_in_a_cycle_is_deleted_between_two_events_and_not_before(driver
         [[] for _ in range(10 * gc.get_threshold()[0])]
     assert widget() is not None
     driver.until(lambda: [[] for _ in range(1_000)] and widget() is None, "its end")
+
+
+def test_nothing_keeps_a_window_that_is_closed_until_python_ends(application):
+    window = open_window(application, SilentRecorder)
+    bridge = weakref.ref(window.bridge)
+    window.bridge.end()
+    for shown in (window, window.subject):
+        shown.deleteLater()
+    del window, shown
+    application.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    gc.unfreeze()  # an opening window keeps all there is from collection
+    gc.collect()
+    assert bridge() is None
