@@ -117,7 +117,7 @@ class Bridge(QObject):
         with suppress(Empty):
             while True:
                 self._fold(message := self._from_threads.get_nowait())
-                if isinstance(message, Judged):
+                if isinstance(message, Judged) and message.live:
                     self._settle(message)
         self._show()
         self.frame.emit()

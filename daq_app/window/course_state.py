@@ -66,11 +66,12 @@ class Quality:
 
 
 class Judged(Struct, frozen=True):
-    """The last stroke was looked at."""
+    """A stroke was looked at."""
 
     trial: int
     take: int
     quality: Quality
+    live: bool = True  # False: from before an interruption, in the time of a stream that has ended
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +126,7 @@ class SessionState:
     people: Kind
     simulated: str | None
     trials: tuple[TrialState, ...]
-    start: float  # when the window heard of it [s]
+    start: float  # when it began, also where it was interrupted since [s]
     phase: Phase = "idle"
     since: float = 0.0  # when this phase began [s]
     before_pause: Phase = "idle"
@@ -168,7 +169,8 @@ def begin_session(message: m.SessionBegun, now: float) -> SessionState:
         for block in message.plan.blocks
         for trial in block.trials
     )
-    session = SessionState(message.folder, message.plan, message.people, message.simulated, trials, now, since=now)
+    start = (message.events[0].time_ns - message.clock_offset_ns) * 1e-9 if message.events else now
+    session = SessionState(message.folder, message.plan, message.people, message.simulated, trials, start, since=now)
     for event in message.events:
         session = _fold_event(session, event)
     return replace(session, marks=())  # theirs is the clock of a stream that has ended
@@ -188,8 +190,8 @@ def _fold_message(session: SessionState, message: object, now: float) -> Session
             saved_at = now if message.safe.time_ns != session.saved_ns else session.saved_at
             phase = cast("Phase", message.state) if message.state in REPORTED else session.phase
             return replace(session, status=message, saved_ns=message.safe.time_ns, saved_at=saved_at, phase=phase)
-        case Judged(trial, take, quality):
-            return _judge(session, trial, take, quality)
+        case Judged():
+            return _judge(session, message)
         case m.Sealing():
             return replace(session, sealing="running")
         case m.Sealed():
@@ -338,15 +340,15 @@ def _restore(session: SessionState, number: int | None, take: int) -> SessionSta
     return session.with_trial(number, outcome="coming", **values)
 
 
-def _judge(session: SessionState, trial: int, take: int, quality: Quality) -> SessionState:
+def _judge(session: SessionState, judgement: Judged) -> SessionState:
     """Return the session with the quality of a stroke; as it is where that take has been repeated."""
-    state = session.trial_state(trial)
-    if state is None or state.takes != take:
+    state, stroke = session.trial_state(judgement.trial), judgement.quality.stroke
+    if state is None or state.takes != judgement.take:
         return session
-    session = replace(session.with_trial(trial, quality=quality), judged_trial=trial)
-    if quality.stroke is None or quality.stroke.steady is None or session.is_over:
+    session = replace(session.with_trial(judgement.trial, quality=judgement.quality), judged_trial=judgement.trial)
+    if stroke is None or stroke.steady is None or not judgement.live or session.is_over:
         return session
-    return _add_mark(session, Mark("steady", *quality.stroke.steady))
+    return _add_mark(session, Mark("steady", *stroke.steady))
 
 
 def _instant(session: SessionState, kind: Literal["onset", "lift"], data: Mapping[str, Any]) -> Mark:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan, Trial
-from sessions.recording import LoggedEvent
+from sessions.recording import LoggedEvent, Recording
 from sessions.run import steps
 from sessions.strokes import AnalysisSettings, FlawName
 from sessions.strokes.analysis import analyse_blocks
@@ -74,6 +75,21 @@ def stroke_quality(block: ReadingBlock, plan: SessionPlan, info: TransducerInfo,
     return Quality(tuple(remarks), stroke, analysis.friction[0], fell)
 
 
+def live_quality(block: ReadingBlock, plan: SessionPlan, info: TransducerInfo, trial: Trial, take: int) -> Judged:
+    """Return the quality of the stroke in hand."""
+    return Judged(trial.number, take, stroke_quality(block, plan, info, trial))
+
+
+def recorded_quality(folder: str, number: int) -> Judged | None:
+    """Return the quality of a trial's stroke from before an interruption; None where no take of it counts."""
+    recording = Recording.open(Path(folder))
+    record = recording.trial(number)
+    if recording.info is None or record.take is None:
+        return None
+    quality = stroke_quality(recording.readings(number), recording.plan, recording.info, record.trial)
+    return Judged(number, record.take.number, quality, live=False)
+
+
 def in_newtons(info: TransducerInfo) -> TransducerInfo:
     """Return the transducer as if it gave its wrench: for readings that were already made newtons."""
     calibration = info.calibration
@@ -127,8 +143,10 @@ class Judge:
                 self._due = float(data["time"]) - self._offset + AFTER
             case LoggedEvent(kind="readings_joined", data=data):
                 self._offset = float(data["time_offset"])
-            case m.SessionBegun():
+            case m.SessionBegun(folder=folder, events=events):
                 self._offset, self._due = 0.0, None
+                for number in dict.fromkeys(event.trial for event in events if event.kind == "take_kept"):
+                    self._submit(recorded_quality, folder, number)
             case LoggedEvent(kind="contact_onset"):
                 self._due = None
 
@@ -145,23 +163,26 @@ class Judge:
         block = feed.take()
         if trial is None or not len(block):
             return
-        arguments = block, session.plan, in_newtons(info), trial.trial
+        self._submit(live_quality, block, session.plan, in_newtons(info), trial.trial, take)
+
+    def _submit(self, work: Callable[..., Judged | None], *arguments: object) -> None:
+        """Have the process do a work, and tell what comes of it."""
         try:
-            future = self.prepare().submit(stroke_quality, *arguments)
+            future = self.prepare().submit(work, *arguments)
         except BrokenProcessPool:  # it ended while it had nothing to do
             self._worker = None
-            future = self.prepare().submit(stroke_quality, *arguments)
-        future.add_done_callback(lambda answer: self._report_quality(number, take, answer))
+            future = self.prepare().submit(work, *arguments)
+        future.add_done_callback(self._report_quality)
 
-    def _report_quality(self, number: int, take: int, answer: "Future[Quality]") -> None:
+    def _report_quality(self, answer: "Future[Judged | None]") -> None:
         if answer.cancelled():
             return
         if error := answer.exception():
             self._worker = None  # the next stroke gets another
             name = type(error).__name__
-            self._send(DrawingFailed(tr("the last stroke was not looked at: {name} {error}", name=name, error=error)))
-            return
-        self._send(Judged(number, take, answer.result()))
+            self._send(DrawingFailed(tr("a stroke was not looked at: {name} {error}", name=name, error=error)))
+        elif (judgement := answer.result()) is not None:
+            self._send(judgement)
 
 
 def _stand_by() -> None:

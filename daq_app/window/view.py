@@ -321,8 +321,7 @@ def _banner(state: AppState) -> Banner | None:
     session, bench = state.session, state.bench
     running = session is not None and not session.is_over
     if session is not None and (sentence_text := _cut_short(state, session)):
-        resume = m.ResumeSession(session.folder) if session.resumable else None
-        return Banner("wrong", sentence_text, tr("Resume session") if resume else "", resume)
+        return Banner("wrong", sentence_text)  # the button of what to do now goes on, where it can
     if state.exit_reason is not None and session is not None and session.sealing == "cut short":
         sentence_text = tr(
             "The recorder has ended while it sealed. Everything is kept: 'daq-app resume --end {folder}' seals it.",

@@ -73,9 +73,9 @@ def test_nothing_keeps_a_window_that_is_closed_until_python_ends(application):
     window = open_window(application, SilentRecorder)
     bridge = weakref.ref(window.bridge)
     window.bridge.end()
-    for shown in (window, window.subject):
-        shown.deleteLater()
-    del window, shown
+    for widget in (window, window.subject):
+        widget.deleteLater()
+    del window, widget
     application.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     gc.unfreeze()  # an opening window keeps all there is from collection
     gc.collect()

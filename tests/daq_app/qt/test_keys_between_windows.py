@@ -33,7 +33,7 @@ def test_an_answer_to_a_recorder_that_is_gone_takes_nothing_away_and_space_resum
     assert not subject.scoring
     QTest.keyClick(subject, Qt.Key.Key_A)  # no request goes to a recorder that is not there
     driver.window.bridge.send(steps.Scored(50.0))
-    assert driver.view.banner.action == "Resume session"
+    assert driver.view.course.primary.label == "Resume session"
     QTest.keyClick(subject, SPACE)  # from whichever window
     driver.phase("mounting")
     assert driver.session.trial == 1

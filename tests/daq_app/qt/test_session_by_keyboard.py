@@ -75,18 +75,22 @@ def test_a_whole_session_with_a_tare_and_a_redo_by_keyboard_alone(driver):
 def test_a_recorder_that_is_killed_is_one_banner_and_the_session_goes_on_at_the_same_trial(driver):
     driver.begin("P08")
     one_trial(driver)
-    folder = driver.session.folder
+    folder, row = driver.session.folder, driver.view.course.rows[1]
+    assert "µ" in row.outcome
     os.kill(driver.window.bridge._client.pid, signal.SIGKILL)
     driver.until(lambda: driver.view.banner is not None, "the banner")
     assert driver.view.banner.grade == "wrong"
     assert driver.view.lamp.grade == "wrong"
-    assert driver.view.banner.action == "Resume session"
+    assert driver.view.course.primary.label == "Resume session"
     QTest.keyClick(driver.window, SPACE)
     assert driver.session.phase == "resuming"
     driver.phase("mounting")
     assert driver.session.folder == folder
     assert driver.session.trial == 2
     assert driver.view.course.rows[1].kind == "done"
+    driver.until(lambda: driver.view.course.rows[1] == row, "the friction from before")
+    assert driver.view.course.stroke.text.startswith(f"Stroke on {driver.session.trials[0].code}")
+    assert "steady" not in {mark.kind for mark in driver.session.marks}  # that stream has ended
     one_trial(driver)
     driver.window.act("end")
     QTest.keyClicks(driver.window.course.line, "enough")

@@ -167,7 +167,7 @@ def test_the_recording_lamp_is_fed_by_what_the_disk_acknowledged_and_by_nothing_
 
 def test_a_session_goes_on_in_the_folder_that_its_end_names():
     state = after(*MOUNT, m.SessionEnded("recordings/P07-rescued", LOST, True))
-    assert derive_view(state).banner.sends == m.ResumeSession("recordings/P07-rescued")
+    assert derive_view(state).course.primary.sends == m.ResumeSession("recordings/P07-rescued")
 
 
 def test_a_session_that_has_ended_shows_no_recording():
@@ -196,9 +196,9 @@ def test_a_session_that_has_ended_shows_no_recording():
             m.AcknowledgeOverloads(),
         ),
         ((*MOUNT, DrawingFailed("ValueError: x")), "look", "the recording goes on", Dismissed()),
-        ((*MOUNT, m.Gone(False, "the recorder has ended unexpectedly (signal 9)")), "wrong", "signal 9", RESUME),
+        ((*MOUNT, m.Gone(False, "the recorder has ended unexpectedly (signal 9)")), "wrong", "signal 9", None),
         ((*MOUNT, m.Failed("StartSession", "the disk is full", "RecordingError")), "wrong", "the disk is full", None),
-        (CUT_SHORT, "wrong", "the cable was pulled", RESUME),
+        (CUT_SHORT, "wrong", "the cable was pulled", None),
     ],
 )
 def test_what_is_wrong_is_one_banner_with_what_can_be_done(messages, grade, words, sends):
