@@ -11,7 +11,20 @@ from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from daq_app.qt.bench_panel import show_connecting
-from daq_app.qt.parts import Panel, Part, button, choice, field, fill, hbox, label, regrade, set_text, vbox
+from daq_app.qt.parts import (
+    Panel,
+    Part,
+    WrappedLabel,
+    button,
+    choice,
+    field,
+    fill,
+    hbox,
+    label,
+    regrade,
+    set_text,
+    vbox,
+)
 from daq_app.qt.preferences import Millimetres, name_of
 from daq_app.qt.subject_picture import Thumbnail
 from daq_app.qt.tokens import GRID, missing_glyphs
@@ -33,7 +46,7 @@ class CardFrame(Panel):
         self._name = name
         self._card: Card | None = None
         self._mark = label("○")
-        self.message = label("", "quiet", wrap=True)
+        self.message = WrappedLabel("quiet", keeps_room=True)
         self._fields = vbox(spacing=4)
         header = hbox(self._mark, (label(tr(name), "name", wrap=True), 1), spacing=GRID)
         vbox(header, self.message, self._fields, on=self, margins=GRID, spacing=4)
@@ -47,8 +60,8 @@ class CardFrame(Panel):
             return
         self._card = card
         set_text(self._mark, "✓" if card.ready else "○")
-        set_text(self.message, card.text, grade="")
-        self.message.setVisible(bool(card.text))
+        self.message.show_text(card.text)
+        regrade(self.message, "")
         state = tr("ready") if card.ready else tr("not ready")
         self.setAccessibleName(f"{tr(self._name)}: {state}. {card.text}".strip())
 

@@ -7,7 +7,20 @@ from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QComboBox, QCompleter, QFileDialog, QRadioButton, QWidget
 
 from daq_app.qt.cards import CardFrame, CutShort, ScreenFields, TransducerRow
-from daq_app.qt.parts import Panel, button, choice, entry, field, hbox, label, scroll_area, set_horizontal, tick, vbox
+from daq_app.qt.parts import (
+    Panel,
+    WrappedLabel,
+    button,
+    choice,
+    entry,
+    field,
+    hbox,
+    label,
+    scroll_area,
+    set_horizontal,
+    tick,
+    vbox,
+)
 from daq_app.qt.tokens import GRID, TARGET, px
 from daq_app.window.checklist import CARD_FIELDS, Card, checklist, codes_in, first_missing, next_code, studies_in
 from daq_app.window.new_session import Bench, SessionForm, enrol_subject, enrolment, optional_phases
@@ -59,7 +72,7 @@ class NewSessionPage(Panel):
         self.with_forces, self.scores_only = self._either(tr("Forces, with the transducer"), tr("Scores only"))
         self.people_score, self.simulated = self._either(tr("People"), tr("Rehearse, simulated"))
         self.transducer = TransducerRow(act)
-        self._people_words = label("", "quiet", wrap=True)
+        self._people_words = WrappedLabel("quiet", keeps_room=True)
         self.screen_fields = ScreenFields(act, self.form)
         meaning = tr("pilot this protocol with simulated hand and answers")
         self._pilot = button(tr("Pilot  F5"), meaning, lambda: act("pilot"))
@@ -135,7 +148,7 @@ class NewSessionPage(Panel):
             text = tr("A simulated hand strokes when asked; you mount, and you or a subject score.")
         elif self.scores_only.isChecked():
             text = tr("The subject strokes and scores; no forces are recorded.")
-        self._people_words.setText(text)
+        self._people_words.show_text(text)
         may = bench.simulated or self.scores_only.isChecked() or not bench.connected
         self.simulated.setEnabled(may)
         if not may and self.simulated.isChecked():

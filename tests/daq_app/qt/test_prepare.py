@@ -72,6 +72,25 @@ def test_what_is_below_the_top_stays_in_place_while_the_transducer_says_more(dri
     assert {width: len(there) for width, there in places.items()} == dict.fromkeys(places, 1)
 
 
+def test_no_card_moves_while_a_code_is_typed_and_who_strokes_is_chosen(driver):
+    page, places = driver.window.page, set()
+
+    def look():
+        for _ in range(3):  # until the words have their lines
+            driver.application.processEvents()
+        places.add(tuple(frame.y() for frame in page.frames.values()))
+
+    page.simulated.setChecked(True)  # whose words are the longest
+    look()
+    places.clear()
+    for code in ("", "P", "Ada Lovelace", "P07"):
+        page.subject.setText(code)
+        look()
+    page.people_score.setChecked(True)
+    look()
+    assert len(places) == 1
+
+
 def test_the_wheel_over_a_list_scrolls_the_page_and_chooses_nothing(driver):
     page = driver.window.page
     for box in (page.protocol, page.stroking, page.studies):
