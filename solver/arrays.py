@@ -164,8 +164,8 @@ class ContactControl(NamedTuple):
     kind: int  # DEPTH_CONTROL, PUSH_CONTROL or DRAG_CONTROL
     drag: float  # of the surface along +x [N/mm]
     push: float  # and along +y
-    stride: float  # largest change of depth or travel [mm]
-    rounds: int  # of changes of the contact states, at most
+    max_increment: float  # of depth or travel [mm]
+    max_rounds: int  # of changes of the contact states
 
 
 class LoadArguments(NamedTuple):

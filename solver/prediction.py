@@ -82,9 +82,9 @@ class NestedNumbers:
     """The `all_numbers` of a scene on the nested mesh, which divides every element into four; SED first."""
 
     numbers: Array  # (COUNT,)
-    of_edges: Array  # (m, COUNT) their changes as each of m edges of contact moves by a node of that mesh
+    edge_changes: Array  # (m, COUNT) their changes as each of m edges of contact moves by a node of that mesh
     row: Array  # (r,) SED of the row of receptors [MPa]
-    row_of_edges: Array  # (m, r) its changes likewise
+    row_edge_changes: Array  # (m, r) its changes likewise
     order: float  # of convergence, which their errors assume
     shares: Array | None = None  # (a + b,) of the SED's error in each column and row of the mesh, where it is too large
 

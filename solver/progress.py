@@ -78,15 +78,15 @@ def report_part(progress: Progress | None, part: float) -> None:
 
 
 @contextmanager
-def aside(doing: str) -> Generator[None]:
+def interlude(doing: str) -> Generator[None]:
     """Report other work until the block ends; then repeat the previous report, or "solving" where there was none.
 
     >>> heard = []
     >>> with listening(lambda doing, part: heard.append(doing)):
-    ...     with aside("compiling"):
+    ...     with interlude("compiling"):
     ...         pass
     ...     report_progress("estimating", 0.5)
-    ...     with aside("compiling"):
+    ...     with interlude("compiling"):
     ...         pass
     >>> heard
     ['compiling', 'solving', 'estimating', 'compiling', 'estimating']

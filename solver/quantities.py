@@ -268,7 +268,7 @@ def _principal(stress: Stress) -> tuple[Array, Array]:
     return np.maximum(middle + radius, zz), np.minimum(middle - radius, zz)
 
 
-def _of_stress(
+def _stress_quantity(
     name: str, label: str, meaning: str, invariant: Callable[[Stress], Array], *, signed: bool = True
 ) -> Quantity:
     """Return the quantity that is an `invariant` of the stress [MPa]."""
@@ -283,15 +283,17 @@ def _of_stress(
     )
 
 
-PRESSURE = _of_stress("pressure", "pressure", "mean of the three normal stresses, compression positive", _pressure)
-VON_MISES = _of_stress("von_mises", "von Mises stress", "von Mises stress", _von_mises, signed=False)
-GREATEST_STRESS = _of_stress(
+PRESSURE = _stress_quantity(
+    "pressure", "pressure", "mean of the three normal stresses, compression positive", _pressure
+)
+VON_MISES = _stress_quantity("von_mises", "von Mises stress", "von Mises stress", _von_mises, signed=False)
+GREATEST_STRESS = _stress_quantity(
     "principal_stress_greatest",
     "greatest principal stress",
     "greatest of the three principal stresses, tension positive",
     lambda stress: _principal(stress)[0],
 )
-LEAST_STRESS = _of_stress(
+LEAST_STRESS = _stress_quantity(
     "principal_stress_least",
     "least principal stress",
     "least of the three principal stresses, tension positive",

@@ -156,7 +156,7 @@ class Follower:
         self._mu, self._tangential = LEAST_MU, 0.0
         self._reached = len(self._models) > 1
         for model in self._models:
-            model.stepper.forget()
+            model.stepper.reset()
 
 
 def _solve_settled(

@@ -18,12 +18,12 @@ from sessions.prediction.stored import (
 )
 from sessions.strokes import Analysis, FrictionParameters, Stroke
 from solver import Finger, Friction, Loading, Prediction, Scene, SceneError, Slide, Solve, SolveFailure, solve_many
-from solver.accuracy.audits import inside_out
+from solver.accuracy.audits import inside_out_warning
 from solver.continuation.small_states import matching_depths
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 from solver.progress import Progress, report_part
-from solver.response.nearby import By, Nearby, nearby
+from solver.response.nearby import Gradient, Nearby, nearby
 from solver.scene.published import BOUND_SCALE
 
 SLIDES: dict[int, Slide] = {PROXIMAL_TO_DISTAL: "+x", DISTAL_TO_PROXIMAL: "-x"}
@@ -224,7 +224,7 @@ def derivatives_by(slide: Nearby, scene: Scene) -> Mapping[str, Mapping[str, flo
     derivatives, force, width = slide.derivatives(), scene.loading.normal_force, scene.finger.width
     per_mm = 0.0 if force is None else (scene.normal_force or 0.0) / force  # of a force as it is given
 
-    def by_load(slope: By, unit: float = 1.0) -> dict[str, float]:
+    def by_load(slope: Gradient, unit: float = 1.0) -> dict[str, float]:
         by_force = per_mm * (slope.normal_force or 0.0)
         return {"mu": unit * slope.mu, "tau_max": unit * slope.tau_max, "force": unit * by_force}
 
@@ -238,7 +238,7 @@ def derivatives_by(slide: Nearby, scene: Scene) -> Mapping[str, Mapping[str, flo
 
 def doubt_of(prediction: Prediction) -> str:
     """Return why numbers are not to be believed where the model was driven beyond its range, else ""."""
-    return inside_out(prediction.audits)
+    return inside_out_warning(prediction.audits)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,7 @@ from types import FrameType
 from typing import Any
 
 from solver._kernels.compiling import events
-from solver.progress import aside
+from solver.progress import interlude
 
 
 class _Compilation(events.Listener):
@@ -38,7 +38,7 @@ class _Compilation(events.Listener):
         self._count += 1
         self._loop, self._open = loop, ExitStack()
         doing = f"compiling {loop.py_func.__name__}, loop number {self._count}, once on this machine"
-        self._open.enter_context(aside(doing))
+        self._open.enter_context(interlude(doing))
         if gc.isenabled():  # numba makes millions of lasting objects: scanning them costs a sixth of the time
             gc.disable()
             self._open.callback(gc.enable)

@@ -118,11 +118,12 @@ def solve_active_set(
     control: ContactControl,
     system: ContactSystem,
 ) -> int:
-    """Solve the skin's system of contact, changing `states` up to `rounds` times until none contradicts the solution.
+    """Solve the skin's system of contact, changing `states` until none contradicts the solution.
 
-    Exact for the linearised body where the rounds suffice. With a `compliance`, the unknowns are forces, of which there
-    are fewer. Fills the reactions of `states`, and `steps` of `system`; with a compliance only the step to equilibrium.
-    Returns the number of systems solved, UNSETTLED or SINGULAR.
+    States change `max_rounds` times at most. Exact for the linearised body where the rounds suffice. With a
+    `compliance`, the unknowns are forces, of which there are fewer. Fills the reactions of `states`, and `steps` of
+    `system`; with a compliance only the step to equilibrium. Returns the number of systems solved, UNSETTLED or
+    SINGULAR.
     """
     size, steps, motion = states.state.shape[0], system.steps, system.motion
     sums, loads = np.zeros((2, 2 * size)), np.zeros(2)  # resultant: derivatives by steps or forces, constant part
@@ -135,11 +136,11 @@ def solve_active_set(
         sum_stiffness(body, control.kind, sums, loads)
     changes = StateChanges(np.empty(size, np.int32), np.empty(size, np.int32), np.empty(size))
     entries = np.zeros(size, np.int32)  # how often each node came into contact
-    history = np.empty((control.rounds + 1, 2, size), np.int32)
+    history = np.empty((control.max_rounds + 1, 2, size), np.int32)
     ahead, above, slip = np.empty(size), np.empty(size), np.empty(size)
     may_hold = load.mu > 0.0 and load.tau > 0.0
     one_by_one, records = size < 0, min(size, 0)  # False and 0; numba compiles subroutines again for literals
-    for round_number in range(control.rounds + 1):
+    for round_number in range(control.max_rounds + 1):
         bounded_length(position.x, skin, system.length)
         if by_forces:
             count = assemble_force_system(compliance, skin, states, load, position, unloaded_step, system, answer)
@@ -149,7 +150,7 @@ def solve_active_set(
             return SINGULAR
         scatter_answer(system, count, by_forces, states, load.mu, answer)
         sticks, by_drag = count_in(states.state, STICK) > 0, control.kind == DRAG_CONTROL
-        if by_drag and not sticks and may_hold and round_number < control.rounds:
+        if by_drag and not sticks and may_hold and round_number < control.max_rounds:
             hold(states.state)  # free along x, the body needs sticking nodes: all stick, then change one by one
             may_hold, one_by_one = False, True
             continue
@@ -158,7 +159,7 @@ def solve_active_set(
             regular &= recover_steps(compliance, answer, unloaded_step, steps, states.reaction)
         else:
             regular &= recover_reaction(body, steps, states.reaction)
-        if not regular or round_number == control.rounds:
+        if not regular or round_number == control.max_rounds:
             return UNSETTLED if regular else SINGULAR
         look_ahead(position, steps, motion, by_drag and not sticks, ahead, above, slip)
         bounded_length(ahead, skin, system.length)
@@ -315,8 +316,8 @@ def control_forces(
     """Add the changes of depth, and of travel where `sticks`, that balance the prescribed forces.
 
     They change the first column of `answer` (2 k, 4). The surface's resultant along x and y is `loads` (2,) plus `sums`
-    (2, 2 k) times the answer. Fills `motion` (2,) with both changes, limited to the control's stride. Returns False
-    where nothing touches, or no change balances the forces.
+    (2, 2 k) times the answer. Fills `motion` (2,) with both changes, `max_increment` at most. Returns False where
+    nothing touches, or no change balances the forces.
     """
     motion[0] = motion[1] = 0.0
     if control.kind == DEPTH_CONTROL or count_in(state, OPEN) == state.shape[0]:
@@ -339,8 +340,11 @@ def control_forces(
     most = max(abs(depth_change), abs(travel_change))
     if not np.isfinite(most):
         return False
-    if most > control.stride:
-        depth_change, travel_change = depth_change * control.stride / most, travel_change * control.stride / most
+    if most > control.max_increment:
+        depth_change, travel_change = (
+            depth_change * control.max_increment / most,
+            travel_change * control.max_increment / most,
+        )
     for c in range(answer.shape[0]):
         answer[c, 0] += depth_change * answer[c, 1] + travel_change * answer[c, 3]
     motion[0], motion[1] = depth_change, travel_change

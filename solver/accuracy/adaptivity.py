@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from solver._kernels.compiling import OPEN, SLIP, STICK
-from solver.accuracy.convergence_order import from_halving
-from solver.accuracy.error_estimate import FROM_EDGES, PARTS, NestedState, Steps, errors
+from solver.accuracy.convergence_order import richardson_factor
+from solver.accuracy.error_estimate import EDGE_SHARE, PARTS, NestedState, Steps, errors
 from solver.arrays import Array, Indices
 from solver.body import Patches
 from solver.body.linear import Elastic
@@ -35,12 +35,12 @@ from solver.mesh.mesher import FINEST, FingerMesh
 from solver.prediction import NestedNumbers
 from solver.scene import Scene
 
-MOST_UNKNOWNS = 25_000  # unknowns of a mesh: its nested one has 100,000, which take 1 s at small strain and 4 at finite
+MAX_UNKNOWNS = 25_000  # unknowns of a mesh: its nested one has 100,000, which take 1 s at small strain and 4 at finite
 # Measured on 23 scenes at tolerances of 0.3 and 0.05 %: halving or doubling one of the next four costs 1 to 18 % more
 # work, except for a smaller growth, which costs 4 % less in more rounds.
-MOST_PARTS = 4  # of one gap in a round, at most: an error says little about elements many times smaller
+MAX_DIVISION = 4  # of one gap in a round, at most: an error says little about elements many times smaller
 GROWTH = 1.3  # of the unknowns in a round, at least
-ERROR_AIM = 0.6  # sum of the parts on the next mesh, by the tolerance
+TARGET_ERROR = 0.6  # sum of the parts on the next mesh, by the tolerance
 SHARE_ORDER = 4.0  # power of a gap's size with which its part falls, where solutions are smooth
 _SCALES = 200  # that are tried, each a tenth smaller
 QUADRATIC = line(np.linspace(-1.0, 1.0, 5))[0]  # (5, 3) at the nodes of two elements, by those of the one they divide
@@ -114,7 +114,7 @@ def adjoint(finger: LinearFinger, displacement: Array, state: EquilibriumState) 
     """
     goal = finger.ending.gradient(displacement)
     goal[finger.geometry.mesh.driven] = 0.0
-    body, recover = finger.body.under(goal)
+    body, recover = finger.body.with_loads(goal)
     compliance, free = body.compliance, body.free_displacement().ravel()
     movable = compliance.diagonal().reshape(-1, 2).all(axis=1)
     touching, sticking = (np.flatnonzero(movable & which) for which in (state.state != OPEN, state.state == STICK))
@@ -142,11 +142,11 @@ def with_shares(
         return nested
     parts = np.concatenate(_grid(finger).parts(finger.displacement(state), state))
     change = abs(float(nested.numbers[0] - numbers[0]))
-    parts *= from_halving(nested.order) * change / max(float(parts.sum()), np.finfo(float).tiny)
+    parts *= richardson_factor(nested.order) * change / max(float(parts.sum()), np.finfo(float).tiny)
     edge = np.flatnonzero(np.diff(state.state))  # node before each edge of contact
     middle = (finger.arcs[edge] + finger.arcs[edge + 1]) / 2.0
     columns = np.searchsorted(finger.geometry.lines.arcs, middle) - 1
-    np.add.at(parts, columns, FROM_EDGES * nested.of_edges[:, 0])
+    np.add.at(parts, columns, EDGE_SHARE * nested.edge_changes[:, 0])
     whole = float(parts.sum())
     return replace(nested, shares=parts / whole if whole > 0.0 else None)
 
@@ -168,8 +168,8 @@ def refine_lines(mesh: FingerMesh, parts: Array | None) -> Lines | None:
     counts = np.array([len(lines.arcs) - 1, lines.rows])
     if parts is None:
         halves = np.full(counts.sum(), 2)
-        return lines.divide(*np.split(halves, counts[:1])) if _unknowns(halves, counts) <= MOST_UNKNOWNS else None
-    most = np.clip(_lengths(mesh) // (FINEST * mesh.outline.finger.tip_radius), 1.0, MOST_PARTS)
+        return lines.divide(*np.split(halves, counts[:1])) if _unknowns(halves, counts) <= MAX_UNKNOWNS else None
+    most = np.clip(_lengths(mesh) // (FINEST * mesh.outline.finger.tip_radius), 1.0, MAX_DIVISION)
     if parts[most == 1.0].sum() > 1.0:  # gaps too small to be divided miss the tolerance alone
         return None
     per_line = parts * np.repeat(counts, counts)
@@ -178,10 +178,10 @@ def refine_lines(mesh: FingerMesh, parts: Array | None) -> Lines | None:
     for scale in per_line.max() * np.geomspace(1.0, 1e-9, _SCALES):
         optimum = np.maximum(np.rint((per_line / scale) ** (1.0 / (SHARE_ORDER + 1.0))), 1.0)
         division = np.minimum(optimum, most)
-        if (unknowns := _unknowns(division, counts)) > MOST_UNKNOWNS:
+        if (unknowns := _unknowns(division, counts)) > MAX_UNKNOWNS:
             break
         best = division
-        if np.sum(parts / optimum**SHARE_ORDER) <= ERROR_AIM and unknowns >= least:
+        if np.sum(parts / optimum**SHARE_ORDER) <= TARGET_ERROR and unknowns >= least:
             break
     if best is None or best.max() == 1.0:
         return None
@@ -222,4 +222,4 @@ def steps_of_press(scene: Scene, finger: Finger[Patches]) -> int:
     if scene.solve.course == "steady" or scene.friction.frictionless:
         return 1
     steps = choose_steps(scene.press_only(), finger)
-    return 1 if steps is None else steps.times
+    return 1 if steps is None else steps.factor

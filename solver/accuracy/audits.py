@@ -16,9 +16,9 @@ from solver.failures import MIXED, NoSteadyState, NotConverged
 from solver.scene import Scene
 
 FORCE_RESIDUAL = 1e-5  # largest relative difference from given forces
-UNSOUND = 1e-4  # relative residual from which a state is refused
-DOUBTED = 1e-8  # relative residual from which a warning is given
-PIERCED = 1e-7  # penetration by the indentation from which a warning is given
+MAX_RESIDUAL = 1e-4  # relative residual from which a state is refused
+WARNING_RESIDUAL = 1e-8  # relative residual from which a warning is given
+WARNING_PENETRATION = 1e-7  # penetration by the indentation from which a warning is given
 State = TypeVar("State")  # with its displacement where that is not part of it
 
 
@@ -39,7 +39,7 @@ def audits(
     force.
     """
     mesh, condensed = finger.geometry.mesh, finger.newton.condensed
-    inner, growth = finger.body.forces(displacement), finger.body.energy_growth(displacement)
+    inner, growth = finger.body.forces(displacement), finger.body.internal_work(displacement)
     if overstress is not None:
         inner = inner + overstress
         growth += float(np.sum(overstress * displacement))
@@ -53,7 +53,7 @@ def audits(
     height = mesh.nodes[skin, 1] + displacement[skin, 1] - state.load.depth
     push = max(float(state.normal.max(initial=0.0)), np.finfo(float).tiny)
     length = np.empty(len(state.state))
-    x = np.ascontiguousarray(state.place(condensed)[:, 0])
+    x = np.ascontiguousarray(state.skin_positions(condensed)[:, 0])
     bounded_length(x, finger.newton.skin, length)
     # Open skin may overhang, with a negative length along the surface, which has no friction limit.
     limit = FrictionLaw(float(state.load.mu), state.load.tau).limit(state.normal, np.maximum(length, 0.0))
@@ -112,7 +112,7 @@ def balance(
 
 def refuse_unsound(checks: Mapping[str, float], depth: float) -> None:
     """Raise NotConverged where residuals at `depth` [mm] are too large, because of round-off."""
-    if (residual := imbalance(checks)) > UNSOUND:
+    if (residual := imbalance(checks)) > MAX_RESIDUAL:
         raise NotConverged(
             f"Forces balance to {residual:.1g} only at {depth:g} mm indentation: round-off has swallowed the answer; "
             f"contacts far smaller than the mesh, {MIXED} do that."
@@ -132,17 +132,17 @@ def refuse_beyond_finger(finger: Finger[Patches], state: EquilibriumState, displ
         )
 
 
-def rounding(checks: Mapping[str, float]) -> tuple[str, ...]:
+def round_off_warnings(checks: Mapping[str, float]) -> tuple[str, ...]:
     """Return a warning for each of `checks` with unusual round-off."""
     warnings: list[str] = []
-    if (residual := imbalance(checks)) > DOUBTED:
+    if (residual := imbalance(checks)) > WARNING_RESIDUAL:
         warnings.append(f"Forces balance to {residual:.1g} only: {MIXED} magnify round-off.")
-    if (low := checks["penetration"]) > PIERCED:
+    if (low := checks["penetration"]) > WARNING_PENETRATION:
         warnings.append(f"The skin lies {low:.1g} of the indentation too low: stiff layers magnify round-off.")
     return tuple(warnings)
 
 
-def inside_out(checks: Mapping[str, float]) -> str:
+def inside_out_warning(checks: Mapping[str, float]) -> str:
     """Return a warning where tissue is turned inside out, else "".
 
     Small strain has finite stiffness and energy there, which no tissue has.
@@ -170,7 +170,7 @@ def course_audits(newton: Newton, states: Sequence[EquilibriumState], *, relaxin
     of the steps.
     """
     reaction = np.array([state.reaction for state in states])  # (m, k, 2)
-    skin = np.array([state.place(newton.condensed) for state in states])
+    skin = np.array([state.skin_positions(newton.condensed) for state in states])
     load = np.array([[state.load.travel, state.load.depth] for state in states])
     mean, motion = (reaction[1:] + reaction[:-1]) / 2.0, np.diff(skin, axis=0)
     slip = motion - np.diff(load, axis=0)[:, None]  # relative to the surface; along y towards it, negative

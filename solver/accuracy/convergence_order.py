@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from solver.arrays import Array
-from solver.continuation import folds_at
+from solver.continuation import critical_stretch
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import Finger, FiniteFinger, finite_laws, settled_moduli
 from solver.failures import cut_folds
@@ -31,7 +31,7 @@ ORDER, CORNER_ORDER = 2.0, 1.0  # beneath a contact, and at a corner
 SECOND_ORDER = {"small": 100.0, "finite": 6.0}
 
 
-def from_halving(order: float) -> float:
+def richardson_factor(order: float) -> float:
     """Return the error of a number on a mesh by what halving its elements changes, the sum of a geometric series."""
     return 1.0 / (1.0 - 2.0**-order)
 
@@ -59,7 +59,7 @@ def _check_cut(finger: FiniteFinger, state: EquilibriumState) -> bool:
     outer = columns[[0, 1, -2, -1]].ravel()  # in the outer columns of the mesh that this one divides
     F = finger.body.deformation(state.u).reshape(len(mesh.elements), -1, 2, 2)[outer]
     least = np.linalg.svd(F, compute_uv=False)[..., -1].min(axis=1)
-    folds = _folding_stretches(finger.scene.materials)[mesh.region[outer]]
+    folds = _critical_stretches(finger.scene.materials)[mesh.region[outer]]
     ends = (least < folds).reshape(2, -1).sum(axis=1)
     if ends.max() > 1:
         worst = int((least - folds).argmin())
@@ -68,14 +68,14 @@ def _check_cut(finger: FiniteFinger, state: EquilibriumState) -> bool:
 
 
 @lru_cache(maxsize=8)
-def _folding_stretches(materials: Materials) -> Array:
+def _critical_stretches(materials: Materials) -> Array:
     """Return the stretch at which a free face folds by region [-]."""
-    return np.array([folds_at(law) for law in finite_laws(materials)])
+    return np.array([critical_stretch(law) for law in finite_laws(materials)])
 
 
 _ROUND_OFF = 1e-12  # relative, of a stiffness
-TRIED_RATIO = 100.0  # largest ratio of stiffnesses of neighbouring tissues in the trials where estimates hold [-]
-TRIED_DEPTH = 0.5  # deepest presses at finite strain in those trials, by the thickness of the tissue [-]
+TRIAL_RATIO = 100.0  # largest ratio of stiffnesses of neighbouring tissues in the trials where estimates hold [-]
+TRIAL_DEPTH = 0.5  # deepest presses at finite strain in those trials, by the thickness of the tissue [-]
 
 
 def trial_warnings(scene: Scene, depth: float) -> Iterator[str]:
@@ -84,16 +84,16 @@ def trial_warnings(scene: Scene, depth: float) -> Iterator[str]:
     Tissues are relaxed, as in the answer.
     """
     ratio, stiff, soft = _stiffness_ratio(scene.materials)
-    if ratio > TRIED_RATIO:
+    if ratio > TRIAL_RATIO:
         yield (
             f"The {stiff} is {float(f'{ratio:.2g}'):,.0f} times as stiff as the {soft}. Error estimates hold in trials "
-            f"up to {TRIED_RATIO:.0f} times; beyond, errors of up to twice the estimate were seen."
+            f"up to {TRIAL_RATIO:.0f} times; beyond, errors of up to twice the estimate were seen."
         )
     part = depth / scene.finger.pulp_thickness()
-    if scene.solve.kinematics == "finite" and part > TRIED_DEPTH:
+    if scene.solve.kinematics == "finite" and part > TRIAL_DEPTH:
         yield (
             f"The finger is pressed by {percent(part)} of its tissue. Error estimates hold in trials up to "
-            f"{percent(TRIED_DEPTH)}; beyond, errors of up to five times the estimate were seen."
+            f"{percent(TRIAL_DEPTH)}; beyond, errors of up to five times the estimate were seen."
         )
 
 

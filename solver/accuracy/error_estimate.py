@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from solver._kernels.active_set import SINGULAR
-from solver.accuracy.convergence_order import ORDER, from_halving
+from solver.accuracy.convergence_order import ORDER, richardson_factor
 from solver.arrays import Array
 from solver.body import Patches
 from solver.contact import ForceLoad
@@ -39,23 +39,23 @@ from solver.scene.tables import USUAL_TOLERANCE
 
 # Parts of the change when an edge of contact moves by one node. Numbers depend on the place of an edge by a parabola
 # about the true place, at most half a node away; the width depends on it linearly.
-FROM_EDGES, WIDTH_FROM_EDGES = 1.0 / 3.0, 0.5
+EDGE_SHARE, WIDTH_EDGE_SHARE = 1.0 / 3.0, 0.5
 SHIFT, _WIDTH = 4, 5  # places of the bone's shift and of the contact's width among the numbers
-_PARTS_OF_EDGES = np.where(np.arange(COUNT) == _WIDTH, WIDTH_FROM_EDGES, FROM_EDGES)
+_EDGE_SHARES = np.where(np.arange(COUNT) == _WIDTH, WIDTH_EDGE_SHARE, EDGE_SHARE)
 
 
-def half_width(change: Array, edges: Array, order: float = ORDER, part: Array | float = FROM_EDGES) -> Array:
+def half_width(change: Array, edges: Array, order: float = ORDER, part: Array | float = EDGE_SHARE) -> Array:
     """Return the error estimate of numbers (...) from their `change` to the nested mesh.
 
     `edges` (m, ...) are their changes there as one edge of contact after the other moves, of which a `part` counts.
     Errors fall with the power `order` of the element size.
     """
-    return from_halving(order) * np.abs(change) + part * edges.sum(axis=0)
+    return richardson_factor(order) * np.abs(change) + part * edges.sum(axis=0)
 
 
 PARTS = np.array([0.48, 0.68])  # of the usual steps: 12 and 17 of 25, about a half and two thirds
-MOST_STEPS = 16  # times the usual steps, at most: a second's work on a coarse mesh at small strain
-STEPS_SHARE = 0.3  # part of a tolerance that the error of the steps may take: the mesh, which costs more, has the rest
+MAX_STEP_FACTOR = 16  # times the usual steps: a second's work on a coarse mesh at small strain
+STEP_ERROR_SHARE = 0.3  # of a tolerance, for the error of the steps: the mesh, which costs more, has the rest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +69,7 @@ class Steps:
     agree with the usual one by chance, so that both estimates of c are added. A settled slide has no such error.
     """
 
-    times: int  # the usual ones
+    factor: int  # their number by the usual one
     excess: Array  # (c,) of the numbers after the usual steps over those after many
     bound: Array  # (c,) of its size
 
@@ -82,17 +82,19 @@ class Steps:
         excess = (fewer - usual) / (1.0 / PARTS - 1.0)[:, None]
         bound = np.abs(excess).sum(axis=0)
         relative_error = float(bound[0]) / max(abs(float(usual[0])), np.finfo(float).tiny)
-        times = min(max(1, ceil(relative_error / (STEPS_SHARE * (tolerance or USUAL_TOLERANCE)))), MOST_STEPS)
-        return Steps(times, excess.mean(axis=0), bound)
+        factor = min(
+            max(1, ceil(relative_error / (STEP_ERROR_SHARE * (tolerance or USUAL_TOLERANCE)))), MAX_STEP_FACTOR
+        )
+        return Steps(factor, excess.mean(axis=0), bound)
 
     @property
     def error(self) -> Array:
         """Error of the numbers (c,) from the finite number of steps."""
-        return self.bound / self.times
+        return self.bound / self.factor
 
     def extrapolate(self, usual: Array) -> Array:
         """Extrapolate numbers (c,) after the usual steps to these."""
-        return usual - (1.0 - 1.0 / self.times) * self.excess
+        return usual - (1.0 - 1.0 / self.factor) * self.excess
 
 
 class Errors(NamedTuple):
@@ -169,7 +171,7 @@ def _move_edges(
 
     A single touching node stays, since there is no contact without it.
     """
-    x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
+    x = np.ascontiguousarray(state.skin_positions(newton.condensed)[:, 0])
     edges = np.flatnonzero(np.diff(state.state)).tolist()
     reuse = newton.condensed.equilibrium is state.u  # the tangent of the last iteration is there still
     solvable = newton.linearise(state, state.load, x, 0, forces, reuse=reuse)
@@ -209,7 +211,7 @@ def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: St
     if nested is None:
         return _without_prescribed(scene, Errors(1.0, 1.0, 1.0, 1.0, 1.0, None, 1.0, 1.0, np.full(len(NAMES), np.nan)))
     change = nested.numbers - numbers
-    error = half_width(change, nested.of_edges, nested.order, _PARTS_OF_EDGES)
+    error = half_width(change, nested.edge_changes, nested.order, _EDGE_SHARES)
     if steps is not None:
         error += steps.error
     relative = error / np.maximum(np.abs(numbers), np.finfo(float).tiny)
@@ -231,7 +233,7 @@ def row_errors(row: Array, nested: NestedNumbers | None) -> Array:
     """Return the errors of the SED of a row of receptors `row` (r,), relative (r,); nan where nothing is known."""
     if nested is None:
         return np.full(len(row), np.nan)
-    error = half_width(nested.row - row, nested.row_of_edges, nested.order)
+    error = half_width(nested.row - row, nested.row_edge_changes, nested.order)
     return error / np.maximum(row, np.finfo(float).tiny)
 
 
@@ -285,7 +287,7 @@ def contrast_error(predictions: Sequence[Prediction]) -> ContrastError:
     count = len(COMPARED)
     numbers = np.abs([(o.sed_ending, o.normal_force, o.tangential_force, o.indentation) for o, _ in with_estimate])
     change = np.abs([nested.numbers[:count] for _, nested in with_estimate]) - numbers
-    edges = np.array([np.linalg.norm(nested.of_edges[:, :count], axis=0) for _, nested in with_estimate])
+    edges = np.array([np.linalg.norm(nested.edge_changes[:, :count], axis=0) for _, nested in with_estimate])
     pairs = np.array(list(combinations(range(len(with_estimate)), 2))).T
     apart = change[pairs[0]] - change[pairs[1]]
     order = min(nested.order for _, nested in with_estimate)

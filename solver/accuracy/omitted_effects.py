@@ -95,7 +95,7 @@ def warnings(scene: Scene, left_out: Mapping[str, Any]) -> tuple[str, ...]:
     """Return a warning for every omitted effect that matters in this scene."""
     sentences: list[str] = []
     if "finite strain" in left_out:
-        sentences += _of_strain(left_out["finite strain"])
+        sentences += _strain_warnings(left_out["finite strain"])
     needs = {
         "bone compliance": 'ask for finger.bone = "meshed"',
         "history": 'ask for solve.course = "history"',
@@ -112,7 +112,7 @@ def warnings(scene: Scene, left_out: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def _of_strain(entry: Mapping[str, Any]) -> list[str]:
+def _strain_warnings(entry: Mapping[str, Any]) -> list[str]:
     numbers, change = entry["from"], entry["estimate"]
     if "limit_mu" in numbers:
         return ["At finite strain this scene has no settled state: the skin folds first. Small strain hides that."]

@@ -17,7 +17,7 @@ from solver.accuracy.omitted_effects import RELAXATION, sideways, with_left_out
 from solver.continuation.finite_states import rough_state
 from solver.continuation.small_states import settled_state
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
-from solver.equilibrium.load_path import PRESSING_TIME, Aim, undeformed_path
+from solver.equilibrium.load_path import PRESSING_TIME, LoadPoint, undeformed_path
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
@@ -100,16 +100,16 @@ def residual_overstress(prediction: Prediction) -> ResidualOverstress | None:
     kind, depth = scene.solve.kinematics, scene.loading.depth
     slide_s = slide / scene.loading.speed if direction else 0.0
     parts = (np.arange(1, _STEPS[kind] + 1) / _STEPS[kind]).tolist()
-    aims = [Aim(PRESSING_TIME * part, depth * part, 0.0) for part in parts]
+    points = [LoadPoint(PRESSING_TIME * part, depth * part, 0.0) for part in parts]
     if slide > 0.0:
-        aims += [Aim(PRESSING_TIME + slide_s * part, depth, direction * slide * part) for part in parts]
+        points += [LoadPoint(PRESSING_TIME + slide_s * part, depth, direction * slide * part) for part in parts]
     try:
         finger = _coarse_finger(scene.frictionless_press(depth), get_ident())
         state = rough_state(finger, scene) if isinstance(finger, FiniteFinger) else settled_state(scene, finger)
         at_last = finger.sed_ending(finger.displacement(state))
         path = undeformed_path(scene, finger, relaxing=True)
-        for aim in aims:
-            path.go(aim)
+        for point in points:
+            path.advance_to(point)
     except SolveFailure:
         return None
     return ResidualOverstress(abs(path.energies[-1][0] / at_last - 1.0), slide_s) if at_last > 0.0 else None

@@ -15,7 +15,7 @@ from solver.constitutive import Elasticity
 from solver.mesh import Q2P1, Mesh, distinct, integrals
 from solver.quantities import LocalState
 
-UNHELD = 1e14  # product of the largest entries of stiffness and compliance, from which the body counts as loose [-]
+MAX_CONDITION = 1e14  # product of the largest entries of stiffness and compliance: beyond, a body is loose [-]
 
 
 class CondensedBody(Protocol):
@@ -43,7 +43,7 @@ class CondensedBody(Protocol):
     def undeformed(self) -> tuple[Array, Array]:
         """Return the displacements and pressures of the undeformed body."""
 
-    def place(self, u: Array) -> Array:
+    def skin_positions(self, u: Array) -> Array:
         """Return the positions of the skin's nodes (k, 2) at displacements `u` [mm]."""
 
     def linearise(self, u: Array, pressure: Array) -> bool:
@@ -83,13 +83,13 @@ class Body(Protocol):
         With `only` (node numbers), other nodes may be left at 0.
         """
 
-    def following(self, skin: Array) -> Array:
+    def recover_increments(self, skin: Array) -> Array:
         """Return the increments (n, 2, c) of all nodes by back substitution of the skin's (2 k, c)."""
 
     def forces(self, displacement: Array) -> Array:
         """Return the internal forces (n, 2) at `displacement` (n, 2) [N/mm]."""
 
-    def energy_growth(self, displacement: Array) -> float:
+    def internal_work(self, displacement: Array) -> float:
         """Return the derivative of the stored energy by a factor of `displacement` (n, 2), at 1 [N]."""
 
     def smallest_det(self, displacement: Array) -> float:
@@ -128,7 +128,7 @@ class CondensedLinear:
         spring = self.stiffness.trace() / max(len(free), 1)
         inside = (self.stiffness + spring * self.springs @ self.springs.T)[np.ix_(free, free)]
         inverse = np.asarray(np.linalg.inv(inside), np.float64)
-        if not np.abs(inside).max(initial=0.0) * np.abs(inverse).max(initial=0.0) < UNHELD:
+        if not np.abs(inside).max(initial=0.0) * np.abs(inverse).max(initial=0.0) < MAX_CONDITION:
             raise LinAlgError("the body is neither held nor balanced")
         size = len(self.stiffness)
         out = np.zeros((size + count, size + count))
@@ -136,7 +136,7 @@ class CondensedLinear:
         out[np.ix_(free, free)] = (inverse + inverse.T) / 2.0
         return out
 
-    def _follow(self, forces: Array) -> Array:
+    def _displacement_by(self, forces: Array) -> Array:
         """Return the displacements (k, 2) under `forces` (2 k,) on the skin."""
         size = len(forces)
         return (self.compliance[:size, :size] @ forces).reshape(-1, 2)
@@ -153,11 +153,11 @@ class CondensedLinear:
 
     def free_displacement(self) -> Array:
         """Return the displacements (k, 2) under the dead loads alone, without free rigid motions."""
-        return self._follow(self.load)
+        return self._displacement_by(self.load)
 
     def displacement_under(self, reaction: Array) -> Array:
         """Return the displacements (k, 2) under the dead loads and forces `reaction` (k, 2) of the surface."""
-        return self._follow(self.load + reaction.ravel())
+        return self._displacement_by(self.load + reaction.ravel())
 
     def stored_energy(self, u: Array, reaction: Array) -> float:  # noqa: ARG002 - tissues that relax may be elsewhere
         """Return the energy stored once the body is relaxed under forces `reaction` (k, 2) [N mm per mm]."""
@@ -167,7 +167,7 @@ class CondensedLinear:
         """Return `trapezoid`: forces grow in proportion to displacements, so that the rule is exact."""
         return trapezoid
 
-    def place(self, u: Array) -> Array:
+    def skin_positions(self, u: Array) -> Array:
         """Return the positions of the skin's nodes (k, 2) at displacements `u` (k, 2) [mm]."""
         return self.rest + u
 
@@ -240,7 +240,7 @@ class Endings:
 VALUES = Q2P1.shape(Q2P1.points)[0]  # (9 points, 9 nodes)
 
 
-class Places(NamedTuple):
+class ProbeData(NamedTuple):
     """Probes with the data of their elements, which no displacement changes."""
 
     probes: "Probes"
@@ -267,21 +267,21 @@ class MeshElements:
         """Integrate the elements of `mesh` with `materials` by region. Raises MeshError for a folded element."""
         return cls(*integrate_elements(mesh, materials, np.full((len(mesh.elements), 16), -1, np.int32)))
 
-    def places(self, probes: "Probes", tangent: Array | None = None) -> "Places":
-        """Return `Places` of probes; `tangent` (p, 2) is the skin's direction, by default along x."""
+    def probe_data(self, probes: "Probes", tangent: Array | None = None) -> "ProbeData":
+        """Return `ProbeData` of probes; `tangent` (p, 2) is the skin's direction, by default along x."""
         of, element, hosts = self.elements, probes.element, distinct(probes.element)
         along = np.tile([1.0, 0.0], (len(element), 1)) if tangent is None else tangent
         constants = np.stack([of.shear[element], of.lame[element], of.stiffening[element], *along.T])
-        return Places(probes, hosts, np.searchsorted(hosts, element), self.modes_at(probes), constants)
+        return ProbeData(probes, hosts, np.searchsorted(hosts, element), self.modes_at(probes), constants)
 
-    def state(self, places: "Places", displacement: Array) -> LocalState:
-        """Return strains and moduli at places, arrays (p, ...), for displacements (nodes, 2, ...)."""
-        hosts, wide = places.hosts, (slice(None), slice(None), *([None] * (displacement.ndim - 2)))
+    def state(self, data: "ProbeData", displacement: Array) -> LocalState:
+        """Return strains and moduli at the probes of `data`, arrays (p, ...), for displacements (nodes, 2, ...)."""
+        hosts, wide = data.hosts, (slice(None), slice(None), *([None] * (displacement.ndim - 2)))
         local = self.mesh.about_centre(displacement, hosts)
-        gradient = places.probes.gradient_of(local.take(places.number, axis=0))
-        fit = self.volume_modes(hosts, local)[places.number]
-        dilatation = np.sum(places.modes[wide] * fit, axis=1)
-        shear, lame, stiffening, x, y = places.constants[wide]
+        gradient = data.probes.gradient_of(local.take(data.number, axis=0))
+        fit = self.volume_modes(hosts, local)[data.number]
+        dilatation = np.sum(data.modes[wide] * fit, axis=1)
+        shear, lame, stiffening, x, y = data.constants[wide]
         return LocalState(
             gradient[:, 0, 0], gradient[:, 0, 1], gradient[:, 1, 0], gradient[:, 1, 1],
             dilatation, shear, lame, stiffening, (x, y),
@@ -349,11 +349,11 @@ class Patches:
 
     def state(self, displacement: Array) -> LocalState:
         """Return strains and moduli at the probes, arrays (p, ...), for displacements (nodes, 2, ...)."""
-        return self.elements.state(self._places, displacement)
+        return self.elements.state(self._probe_data, displacement)
 
     @cached_property
-    def _places(self) -> "Places":
-        return self.elements.places(self.endings.probes, self.endings.tangent)
+    def _probe_data(self) -> "ProbeData":
+        return self.elements.probe_data(self.endings.probes, self.endings.tangent)
 
     def energy(self, displacement: Array) -> Array:
         """Return the SED at the probes (p, ...) [MPa] for displacements (nodes, 2, ...)."""

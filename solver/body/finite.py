@@ -64,7 +64,7 @@ class FiniteBody(MeshElements):
         """Do as `Body` says."""
         return u
 
-    def following(self, skin: Array) -> Array:
+    def recover_increments(self, skin: Array) -> Array:
         """Do as `Body` says, with the last tangent."""
         out = np.zeros((*self.mesh.nodes.shape, skin.shape[1]))
         inside, recovery = self.condensed.inside, self.condensed.system.recovery_matrix[:, :, :16].copy()
@@ -98,7 +98,7 @@ class FiniteBody(MeshElements):
         H = self.gradient(cast("Array", u + 1j * IMAGINARY * direction))
         return self._energy(H).imag / IMAGINARY
 
-    def energy_growth(self, displacement: Array) -> float:
+    def internal_work(self, displacement: Array) -> float:
         """Do as `Body` says, independently of the stresses."""
         return self.energy_slope(displacement, displacement)
 
@@ -188,7 +188,7 @@ class CondensedFinite:
         """Return zero displacements (nodes, 2) and pressures (e, 3)."""
         return np.zeros(self.body.mesh.nodes.shape), np.zeros((len(self.body.elements.nodes), 3))
 
-    def place(self, u: Array) -> Array:
+    def skin_positions(self, u: Array) -> Array:
         """Return the positions of the skin's nodes (k, 2) at displacements `u` (nodes, 2) [mm]."""
         skin = self.body.mesh.skin
         return self.body.mesh.nodes[skin] + u[skin]
@@ -203,7 +203,7 @@ class CondensedFinite:
 
     def relinearise(self, u: Array) -> bool:
         """Condense the forces at a state with the last factors; return False where it is inside out."""
-        if not self.resist(u) > 0.0:
+        if not self.assemble_forces(u) > 0.0:
             return False
         self._condense()
         return True
@@ -216,7 +216,7 @@ class CondensedFinite:
         """Fill tangents and forces at a state and return the smallest det F."""
         return self._assemble(u, pressure, True)
 
-    def resist(self, u: Array) -> float:
+    def assemble_forces(self, u: Array) -> float:
         """Fill the forces at a state, keep the tangent, and return the smallest det F."""
         return self._assemble(u, self._no_pressure, False)
 

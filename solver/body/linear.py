@@ -13,7 +13,7 @@ from solver._kernels import elements as element_loops
 from solver._kernels.multifrontal import DEFINITE
 from solver.arrays import Array, ElementSystem, Indices, determinant, inverse
 from solver.body import CondensedLinear, MeshElements, Patches, Probes, held_directions, integrate_elements
-from solver.body.validation import BodyError, check_body, check_held, check_loads, loose
+from solver.body.validation import BodyError, check_body, check_held, check_loads, unprevented_motions
 from solver.constitutive import Elasticity
 from solver.linalg import ElementSubset, Elimination, symbolic_factorization
 from solver.mesh import GAUSS_4, Q2P1, Mesh, jacobians, line
@@ -52,7 +52,7 @@ class Elastic(MeshElements):
 
     def energy(self, probes: Probes, displacement: Array) -> Array:
         """Return the SED (p, ...) [MPa] for displacements (nodes, 2, ...)."""
-        return SED.small(self.state(self.places(probes), displacement))
+        return SED.small(self.state(self.probe_data(probes), displacement))
 
 
 class LinearElimination:
@@ -190,7 +190,7 @@ class LinearBody:
         """Do as `Body` says."""
         return self.elastic.centre
 
-    def every_step(self) -> Array:
+    def unit_displacements(self) -> Array:
         """Return the displacements (nodes, 2, 2 k) for a unit displacement of each of the skin's unknowns."""
         k = len(self.mesh.skin)
         return self.displacement(np.eye(2 * k).reshape(k, 2, 2 * k)) - self.displacement(np.zeros((k, 2, 1)))
@@ -203,11 +203,11 @@ class LinearBody:
         """
         inner = self.forces(displacement)
         inner[self.mesh.driven] = 0.0
-        about, recover = self.under(-inner)
+        about, recover = self.with_loads(-inner)
         about.rest = self.mesh.nodes[self.mesh.skin] + displacement[self.mesh.skin]
         return about, lambda step: displacement + recover(step)
 
-    def under(self, loads: Array) -> tuple[CondensedLinear, Callable[[Array], Array]]:
+    def with_loads(self, loads: Array) -> tuple[CondensedLinear, Callable[[Array], Array]]:
         """Return the body under other dead `loads` (nodes, 2), and a function that recovers displacements.
 
         It maps those of the skin (k, 2) to those of all nodes (nodes, 2) [mm]; held nodes stay.
@@ -219,7 +219,7 @@ class LinearBody:
 
         return self.condensed.with_load(self.elimination.skin_load(load)), recover
 
-    def following(self, skin: Array) -> Array:
+    def recover_increments(self, skin: Array) -> Array:
         """Do as `Body` says."""
         return self.displacement(skin.reshape(-1, 2, skin.shape[1]))
 
@@ -227,7 +227,7 @@ class LinearBody:
         """Do as `Body` says."""
         return self.mesh.assemble(self.elastic.forces(self.mesh.local(displacement)))
 
-    def energy_growth(self, displacement: Array) -> float:
+    def internal_work(self, displacement: Array) -> float:
         """Do as `Body` says."""
         local = self.mesh.about_centre(displacement)
         return float(np.sum(local * self.elastic.forces(local)))
@@ -317,7 +317,7 @@ def _condense_skin(mesh: Mesh, stiffness: Array, load: Array, free: Sequence[Mot
     place = mesh.nodes[mesh.skin]
     (x, y), ones, zeros = place.T, np.ones(len(place)), np.zeros(len(place))
     shapes = {"x": np.c_[ones, zeros].ravel(), "y": np.c_[zeros, ones].ravel(), "turn": np.c_[-y, x].ravel()}
-    rigid = np.stack(list(shapes.values()), axis=1) @ loose(mesh)
+    rigid = np.stack(list(shapes.values()), axis=1) @ unprevented_motions(mesh)
     skin = CondensedLinear(place, stiffness, load, skin_lengths(mesh), held_directions(mesh))
     skin.springs = np.linalg.qr(rigid)[0] if rigid.shape[1] else rigid
     skin.motions = np.stack([shapes[name] for name in free], axis=1) if free else np.zeros((2 * len(place), 0))

@@ -6,7 +6,7 @@ import numpy as np
 
 from solver.arrays import Array, Flags, Indices
 
-SQUEEZED = 0.85  # stretch to one side of a joint below which a jump of the tangent counts as a kink
+KINK_STRETCH = 0.85  # stretch to one side of a joint below which a jump of the tangent counts as a kink
 
 
 class SkinCompression(NamedTuple):
@@ -15,30 +15,31 @@ class SkinCompression(NamedTuple):
     A neo-Hookean half-space in plane strain wrinkles at a stretch of 0.544 (Biot 1963, Appl. Sci. Res. A 12, 168).
     """
 
-    least: float  # least ratio of deformed to undeformed length, over halves of elements' sides
-    place: int  # element with the least ratio
-    lowest: float  # least stretch, at the ends of elements too: more accurate where elements are large
+    least_chord: float  # least ratio of deformed to undeformed length, over halves of elements' sides
+    element: int  # with the least ratio
+    least_stretch: float  # least stretch, at the ends of elements too: more accurate where elements are large
     kink: float  # largest jump of the tangent between elements, by undeformed length: large at a crease.
     # Only open, compressed skin counts: jumps where it touches, or is stretched at an edge of contact, are the mesh's.
 
     @staticmethod
-    def of(nodes: Array, u: Array, loose: Flags, touching: Flags) -> "SkinCompression":
-        """Return how far the sides of a elements are compressed, where `loose` (a,) is true.
+    def of(nodes: Array, u: Array, away_from_held: Flags, touching: Flags) -> "SkinCompression":
+        """Return how far the sides of a elements are compressed, where `away_from_held` (a,) is true.
 
         `nodes` (2 a + 1, 2) are their undeformed positions and `u` (2 a + 1, 2) their displacements [mm]. Some are
         `touching` (2 a + 1,).
         """
-        if not loose.any():
+        if not away_from_held.any():
             return SkinCompression(np.inf, 0, np.inf, 0.0)
-        steps = np.diff(np.stack([nodes, nodes + u]), axis=1).reshape(2, -1, 2, 2)[:, loose]  # (2, l, halves, 2)
+        steps = np.diff(np.stack([nodes, nodes + u]), axis=1).reshape(2, -1, 2, 2)  # by element and half
+        steps = steps[:, away_from_held]
         lengths = _length(steps)
         ratio = lengths[1] / lengths[0]
         tangents = 3.0 * steps - steps[:, :, ::-1]  # at both ends
         tangent = tangents[1] / _length(tangents[0])[..., None]
         stretch = _length(tangent)
-        elements = np.flatnonzero(loose)
+        elements = np.flatnonzero(away_from_held)
         joints = (np.diff(elements) == 1) & ~touching[2 * elements[1:]]
-        joints &= np.minimum(stretch[1:, 0], stretch[:-1, 1]) < SQUEEZED
+        joints &= np.minimum(stretch[1:, 0], stretch[:-1, 1]) < KINK_STRETCH
         jumps = _length(tangent[1:, 0] - tangent[:-1, 1])[joints]
         worst = int(ratio.min(axis=1).argmin())
         least = float(ratio[worst].min())
@@ -66,10 +67,10 @@ def crosses_itself(line: Array) -> bool:
     for low, high in zip(np.minimum(start, end).T, np.maximum(start, end).T, strict=True):
         overlap &= (high[:, None] >= low) & (high >= low[:, None])
     piece, partner = np.nonzero(overlap)
-    return bool(np.any(_cuts(start, end, piece, partner) & _cuts(start, end, partner, piece)))
+    return bool(np.any(_intersects(start, end, piece, partner) & _intersects(start, end, partner, piece)))
 
 
-def _cuts(start: Array, end: Array, piece: Indices, partner: Indices) -> Flags:
+def _intersects(start: Array, end: Array, piece: Indices, partner: Indices) -> Flags:
     """Return whether the line through each `piece` (p,) has the ends of its `partner` (p,) on both sides."""
     along, first, last = (end - start)[piece], start[partner] - start[piece], end[partner] - start[piece]
     sides = [along[:, 0] * to[:, 1] - along[:, 1] * to[:, 0] for to in (first, last)]

@@ -176,7 +176,7 @@ def finite(name: str, value: float) -> float:
     return float(value)
 
 
-def loose(mesh: Mesh) -> Array:
+def unprevented_motions(mesh: Mesh) -> Array:
     """Return a basis (3, r) of the rigid motions that no held node prevents, as combinations of MOTIONS."""
     if len(distinct(mesh.held)) > 1:
         return np.zeros((3, 0))
@@ -210,7 +210,7 @@ def check_held(mesh: Mesh, free: Sequence[str] = ()) -> None:
             "nothing holds the body; name the nodes that are driven in mesh.held, or the motions along which the "
             'surface alone balances the loads, as free = ("y", "turn")'
         )
-    motions = loose(mesh)
+    motions = unprevented_motions(mesh)
     motions[[MOTIONS.index(name) for name in free]] = 0.0
     if len(mesh.fixed) and np.abs(motions).max(initial=0.0) > CUT:
         raise BodyError(

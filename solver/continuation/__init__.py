@@ -40,22 +40,22 @@ class BranchControl:
     """
 
     tolerance: float = 1e-5  # of a point on the branch, by the length scale of the body
-    first: float = 0.1  # first step along the branch
-    shortest: float = 1e-3  # shortest step
-    growth: float = 1.5  # ratio of the next step to one with few iterations
-    easy: int = 5  # iterations that count as few
-    corrections: int = 12  # iterations for a point, at most
-    most: int = 400  # points, at most
-    turn: float = 0.7  # least cosine between the directions of the branch and of a step along it
-    squeeze: float = 0.85  # smallest ratio of least stretches at consecutive points: a jump to a fold has less
-    crease: float = 0.6  # kink from which skin has a crease: smooth skin on coarse meshes has 0.3, creases 1 and more
-    steep: float = 0.1  # share of the parameter in the tangent from which a limit point is far
-    hops: int = 3  # attempts to continue beyond the end of a branch
-    hop: tuple[float, ...] = (0.01, 0.03)  # relative steps of the parameter for that
-    force_change: float = 0.05  # largest relative change of the forces in such a step
-    apart: float = 0.04  # largest difference of least stretches at consecutive points
-    aim: float = 0.5  # part of that difference at which a step aims
-    unit: float = 0.1  # displacement, by the length scale of the body, that counts as much as a friction of 1
+    first_step: float = 0.1  # along the branch
+    min_step: float = 1e-3
+    step_growth: float = 1.5  # ratio of the next step to one with few iterations
+    few_iterations: int = 5  # iterations that count as few
+    max_corrections: int = 12  # iterations for a point
+    max_points: int = 400
+    min_cosine: float = 0.7  # between the directions of the branch and of a step along it
+    min_stretch_ratio: float = 0.85  # of consecutive points: a jump to a fold has less
+    max_kink: float = 0.6  # kink from which skin has a crease: smooth skin on coarse meshes has 0.3, creases 1 and more
+    regular_rate: float = 0.1  # share of the parameter in the tangent from which a limit point is far
+    max_restarts: int = 3  # attempts to continue beyond the end of a branch
+    restart_steps: tuple[float, ...] = (0.01, 0.03)  # relative steps of the parameter for that
+    max_force_change: float = 0.05  # relative, in such a step
+    max_stretch_change: float = 0.04  # of the least stretch, between consecutive points
+    stretch_change_share: float = 0.5  # part of that change at which a step aims
+    displacement_scale: float = 0.1  # by the length scale of the body: counts as much as a friction of 1
 
 
 BRANCH = BranchControl()
@@ -82,8 +82,8 @@ class Branch:
 
     states: tuple[EquilibriumState, ...]
     value: float  # largest friction coefficient or depth [mm] on it
-    limited: bool  # whether the branch ends before its target
-    lost: bool = False  # whether only the corrector failed there, far from a limit point and from a fold
+    ends_early: bool  # whether the branch ends before its target
+    corrector_failed: bool = False  # whether only the corrector failed there, far from a limit point and from a fold
     length: float | None = None  # of the next step along it, where it continues
 
     @property
@@ -111,7 +111,7 @@ class Continuation:
 
     body: BranchBody
     parameter: int  # BY_FRICTION or BY_DEPTH
-    folds: float  # least stretch of the skin at which a branch ends [-]
+    critical_stretch: float  # least stretch of the skin, at which a branch ends [-]
 
     def branch(self, start: EquilibriumState, target: float) -> Branch:
         """Follow a branch as `trace` does, up to exactly `target`."""
@@ -120,86 +120,89 @@ class Continuation:
     def trace(self, start: EquilibriumState, target: float, length: float | None = None) -> Branch:
         """Follow a branch as `follow` does, and continue where it turns back only over a short stretch."""
         branch = self.follow(start, target, length)
-        for _ in range(BRANCH.hops):
-            beyond = self._beyond(branch, target) if branch.limited else None
+        for _ in range(BRANCH.max_restarts):
+            beyond = self._restart(branch, target) if branch.ends_early else None
             if beyond is None:
                 break
             hop = self.follow(beyond, target)
             branch = replace(hop, states=(*branch.states, *hop.states))
         return branch
 
-    def _beyond(self, branch: Branch, target: float) -> EquilibriumState | None:
+    def _restart(self, branch: Branch, target: float) -> EquilibriumState | None:
         """Return a state a little beyond the end of a branch; None where it really ends.
 
         Where a node of the contact reaches the shear limit, a discrete branch may turn back over a short stretch.
         """
         last = branch.last
-        least = self.body.skin_compression(last).least
-        if least < self.folds + BRANCH.apart:
+        least = self.body.skin_compression(last).least_chord
+        if least < self.critical_stretch + BRANCH.max_stretch_change:
             return None
-        for part in BRANCH.hop:
+        for part in BRANCH.restart_steps:
             load = self._with_value(last.load, min((1.0 + part) * branch.value, target))
             try:
-                state = self.body.newton.settle(last, load, _ON_BRANCH)
+                state = self.body.newton.solve(last, load, _ON_BRANCH)
             except NotConverged:
                 continue
-            near = abs(state.force - last.force).max() <= BRANCH.force_change * abs(last.force).max()
-            if near and self._is_next(least, last, state):
+            near = abs(state.force - last.force).max() <= BRANCH.max_force_change * abs(last.force).max()
+            if near and self._continues(least, last, state):
                 return state
         return None
 
-    def _is_next(self, least: float, last: EquilibriumState, state: EquilibriumState) -> bool:
+    def _continues(self, least: float, last: EquilibriumState, state: EquilibriumState) -> bool:
         """Return whether a state follows the `last` one, with skin stretched to `least`, without a jump."""
-        return self.body.skin_compression(state).least >= least - BRANCH.apart and not jumped_branch(
+        return self.body.skin_compression(state).least_chord >= least - BRANCH.max_stretch_change and not jumped_branch(
             self.body, last, state
         )
 
     def follow(self, start: EquilibriumState, target: float, length: float | None = None) -> Branch:
         """Follow the branch from `start` until the parameter passes `target`.
 
-        It ends where the parameter passes a maximum, or where the least stretch of the skin reaches `folds`. `length`
-        is that of the first step. In friction no step depends on `target`, so that all targets beyond the end have one
-        limit.
+        It ends where the parameter passes a maximum, or where the least stretch of the skin reaches `critical_stretch`.
+        `length` is that of the first step. In friction no step depends on `target`, so that all targets beyond the end
+        have one limit.
         """
         points = [self._point(start)]
         best = 0  # the point with the largest parameter
         in_friction = self.parameter == BY_FRICTION
         scale = LARGEST_MU if in_friction else target - points[0].value
-        shortest = BRANCH.shortest * scale
-        length = BRANCH.first * scale if length is None else length
+        shortest = BRANCH.min_step * scale
+        length = BRANCH.first_step * scale if length is None else length
         tangent = self._tangent(start)
         doing = f"following sliding to its {'largest friction' if in_friction else 'largest depth'}"
 
-        def finish(value: float, *, limited: bool = True, lost: bool = False) -> Branch:
-            return Branch(tuple(point.state for point in points[: best + 1]), value, limited, lost, length)
+        def finish(value: float, *, ends_early: bool = True, corrector_failed: bool = False) -> Branch:
+            return Branch(
+                tuple(point.state for point in points[: best + 1]), value, ends_early, corrector_failed, length
+            )
 
         while points[best].value < target * (1.0 - _ROUND_OFF):
             check_stop()
             report_progress(doing, points[best].value / target)
             last = points[-1]
-            step = self._further(last, tangent, length, shortest)
-            if step is None or len(points) > BRANCH.most:
-                lost = tangent.rate > BRANCH.steep and last.compression.least > self.folds + BRANCH.apart
-                return finish(points[best].value, lost=lost)
+            step = self._step(last, tangent, length, shortest)
+            if step is None or len(points) > BRANCH.max_points:
+                far = last.compression.least_chord > self.critical_stretch + BRANCH.max_stretch_change
+                return finish(points[best].value, corrector_failed=far and tangent.rate > BRANCH.regular_rate)
             point, length = step
-            fall = last.compression.least - point.compression.least
-            if point.compression.least < self.folds:
-                part = min(max((last.compression.least - self.folds) / fall, 0.0), 1.0)
+            fall = last.compression.least_chord - point.compression.least_chord
+            if point.compression.least_chord < self.critical_stretch:
+                part = min(max((last.compression.least_chord - self.critical_stretch) / fall, 0.0), 1.0)
                 return finish(max(points[best].value, last.value + part * (point.value - last.value)))
             points.append(point)
             if point.value > points[best].value:
                 best = len(points) - 1
-            easy = point.state.iterations - last.state.iterations <= BRANCH.easy
-            most = BRANCH.growth * length if easy else length
+            easy = point.state.iterations - last.state.iterations <= BRANCH.few_iterations
+            most = BRANCH.step_growth * length if easy else length
             if fall > 0.0:  # the next step aims at a part of the largest fall of the stretch, or just beyond the fold
-                aim = min(BRANCH.aim * BRANCH.apart, BRANCH.growth * (point.compression.least - self.folds))
+                to_fold = point.compression.least_chord - self.critical_stretch
+                aim = min(BRANCH.stretch_change_share * BRANCH.max_stretch_change, BRANCH.step_growth * to_fold)
                 most = min(most, max(aim / fall * length, shortest))
             previous, length, tangent = tangent, most, self._tangent(point.state)
             if tangent.direction @ previous.direction + tangent.rate * previous.rate < 0.0:
                 tangent = _Tangent(-tangent.direction, -tangent.rate)
             if tangent.rate <= 0.0:
                 return finish(points[best].value)
-        return finish(points[best].value, limited=False)
+        return finish(points[best].value, ends_early=False)
 
     def stop_at(self, branch: Branch, target: float) -> Branch:
         """Return a branch up to `target`; the whole branch where it ends before."""
@@ -208,29 +211,29 @@ class Continuation:
         values = [self._value(state.load) for state in branch.states]
         after = next((number for number, value in enumerate(values) if value >= target), len(values))
         if after < len(values) and values[after] <= target * (1.0 + _ROUND_OFF):
-            return Branch(branch.states[: after + 1], values[after], limited=False)
+            return Branch(branch.states[: after + 1], values[after], ends_early=False)
         for near in branch.states[max(after - 1, 0) : after + 1]:
             with suppress(NotConverged):
-                state = self.body.newton.settle(near, self._with_value(near.load, target), _ON_BRANCH)
+                state = self.body.newton.solve(near, self._with_value(near.load, target), _ON_BRANCH)
                 if not jumped_branch(self.body, near, state):
-                    return Branch((*branch.states[:after], state), target, limited=False)
-        return Branch(branch.states[:after], values[after - 1], limited=True, lost=True)
+                    return Branch((*branch.states[:after], state), target, ends_early=False)
+        return Branch(branch.states[:after], values[after - 1], ends_early=True, corrector_failed=True)
 
     @property
     def unit(self) -> float:
         """Displacement of one unknown that counts as much as a unit of the parameter, a friction or a mm [mm]."""
         newton = self.body.newton
-        norm = BRANCH.unit * newton.length_scale if self.parameter == BY_FRICTION else 1.0
+        norm = BRANCH.displacement_scale * newton.length_scale if self.parameter == BY_FRICTION else 1.0
         return norm * float(np.sqrt(len(newton.steps)))
 
     def _point(self, state: EquilibriumState) -> _Point:
         return _Point(state, self.body.skin_compression(state), self._value(state.load))
 
-    def _further(self, last: _Point, tangent: _Tangent, length: float, shortest: float) -> tuple[_Point, float] | None:
+    def _step(self, last: _Point, tangent: _Tangent, length: float, shortest: float) -> tuple[_Point, float] | None:
         """Return the next point of the branch and the length of the step to it; None where every step fails."""
         while length >= shortest:
-            state = self._next(last, tangent, length)
-            if state is not None and self._is_next(last.compression.least, last.state, state):
+            state = self._arc_step(last, tangent, length)
+            if state is not None and self._continues(last.compression.least_chord, last.state, state):
                 return self._point(state), length
             length /= 2.0
         return None
@@ -250,12 +253,12 @@ class Continuation:
         size = float(np.sqrt(direction @ direction + 1.0))
         return _Tangent(direction / size, 1.0 / size)
 
-    def _next(self, start: _Point, tangent: _Tangent, length: float) -> EquilibriumState | None:
+    def _arc_step(self, start: _Point, tangent: _Tangent, length: float) -> EquilibriumState | None:
         """Return the state a step of `length` along the branch; None where the corrector fails."""
         newton, (direction, rate), unit = self.body.newton, tangent, self.unit
         state, load = start.state, start.state.load
         total = np.zeros(len(newton.steps))
-        for _ in range(BRANCH.corrections):
+        for _ in range(BRANCH.max_corrections):
             if not newton.linearise(state, load, newton.skin_x):
                 return None
             to, along = newton.steps[:, EQUILIBRIUM] / unit, newton.steps[:, self.parameter] / unit
@@ -273,14 +276,18 @@ class Continuation:
             if largest < BRANCH.tolerance * newton.length_scale and not changes:
                 moved = self._value(load) - start.value
                 distance = np.sqrt(total @ total + moved**2)
-                return state if direction @ total + rate * moved > BRANCH.turn * distance else None
+                return state if direction @ total + rate * moved > BRANCH.min_cosine * distance else None
         return None
 
 
 def jumped_branch(body: BranchBody, before: EquilibriumState, after: EquilibriumState) -> bool:
     """Return whether a step led to another branch, on which the skin is folded."""
     start, end = body.skin_compression(before), body.skin_compression(after)
-    return end.least < BRANCH.squeeze * start.least or end.kink > BRANCH.crease or body.crosses(after)
+    return (
+        end.least_chord < BRANCH.min_stretch_ratio * start.least_chord
+        or end.kink > BRANCH.max_kink
+        or body.crosses(after)
+    )
 
 
 Waves = NDArray[np.complex128]
@@ -290,13 +297,13 @@ HALVINGS = 40  # of its last step
 
 
 @lru_cache(maxsize=16)
-def folds_at(law: Law) -> float:
+def critical_stretch(law: Law) -> float:
     """Return the stretch along a free surface at which it loses stability in plane strain; LEAST where it never does.
 
     Biot's root for neo-Hookean tissue that keeps its volume, 0.5437:
 
     >>> from solver.constitutive import NeoHooke
-    >>> round(folds_at(NeoHooke(1.0, 0.4999999)), 4)
+    >>> round(critical_stretch(NeoHooke(1.0, 0.4999999)), 4)
     0.5437
     """
     high = 1.0 - 5.0 * _STEP

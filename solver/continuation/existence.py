@@ -10,15 +10,15 @@ from solver._kernels.compiling import OPEN, SHEAR_LIMITED
 from solver._kernels.contact_system import SHEAR_LIMITED_MU
 from solver.contact import LoadState
 from solver.continuation import Continuation
-from solver.continuation.limit_point import LIMIT, Reach, is_folded, is_sound, reach_in_depth, reach_in_friction
+from solver.continuation.limit_point import LIMIT, ContinuationLimit, depth_limit, friction_limit, is_folded, is_sound
 from solver.equilibrium import TO_ROUND_OFF, EquilibriumState, Newton
 from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_stepping import solve_full_slip
 from solver.failures import NoSteadyState, NotConverged
 from solver.scene import Scene
 
-FAR_BELOW = 0.9  # fraction of the given friction or depth below which a limit is certain
-ALIKE = 0.1  # relative difference of SED and forces below which states of two meshes are the same
+CERTAIN_SHARE = 0.9  # fraction of the given friction or depth below which a limit is certain
+AGREEMENT = 0.1  # relative difference of SED and forces below which states of two meshes are the same
 BEYOND_LIMIT = 0.06  # relative distance beyond a limit at which another path is tried: twice the 3 % accuracy of limits
 
 
@@ -36,14 +36,14 @@ def proven_slide(
     """
     candidates: list[EquilibriumState] = []
     for state in _direct_states(finger.newton, load, tolerance, start):
-        if is_sound(finger, state, LIMIT.plain):
+        if is_sound(finger, state, LIMIT.safe_stretch):
             return state
         candidates.append(state)
-    proof = _reach_towards(finger.scene, load)
-    if proof.lost:
+    proof = _limit_towards(finger.scene, load)
+    if proof.corrector_failed:
         raise _undecided(load, proof)
-    if proof.limited:
-        raise _refusal(finger.scene, load, proof)
+    if proof.ends_early:
+        raise _no_slide(finger.scene, load, proof)
     for state in candidates:
         if _agrees(finger, state, proof):
             return state
@@ -53,7 +53,7 @@ def proven_slide(
             "skin slipping at the bound, and this mesh does not find it: another tolerance has another mesh"
         )
     branch = Continuation(finger, proof.search.parameter, 0.0).trace(proof.search.start(finger), proof.search.target)
-    if not branch.limited:
+    if not branch.ends_early:
         state = solve_full_slip(finger.newton, load, branch.last, tolerance)
         if _agrees(finger, state, proof):
             return state
@@ -66,12 +66,12 @@ def proven_slide(
 
 def is_on_branch(finger: FiniteFinger, state: EquilibriumState) -> bool:
     """Return whether a state lies on the branch from the frictionless state, where need be by following that."""
-    if is_sound(finger, state, LIMIT.plain):
+    if is_sound(finger, state, LIMIT.safe_stretch):
         return True
     if not is_sound(finger, state):
         return False
-    proof = _reach_towards(finger.scene, state.load)
-    return not proof.limited and _agrees(finger, state, proof)
+    proof = _limit_towards(finger.scene, state.load)
+    return not proof.ends_early and _agrees(finger, state, proof)
 
 
 def is_mostly_shear_limited(load: LoadState) -> bool:
@@ -86,9 +86,9 @@ def refuse_far_beyond(scene: Scene, load: LoadState) -> None:
     Nothing is raised where the branch ends so near that another mesh may have the state.
     """
     with suppress(NotConverged):
-        proof = _reach_towards(scene, load)
-        if proof.ends and proof.value < FAR_BELOW * (load.depth if proof.by_depth else load.mu):
-            raise _refusal(scene, load, proof)
+        proof = _limit_towards(scene, load)
+        if proof.is_certain and proof.value < CERTAIN_SHARE * (load.depth if proof.by_depth else load.mu):
+            raise _no_slide(scene, load, proof)
 
 
 def _direct_states(
@@ -112,45 +112,45 @@ def _direct_states(
 
 def limit_warnings(finger: FiniteFinger, state: EquilibriumState) -> tuple[str, ...]:
     """Return a warning for a settled slide near the limit of friction, else nothing."""
-    if state.load.sense == 0 or is_sound(finger, state, LIMIT.plain):
+    if state.load.sense == 0 or is_sound(finger, state, LIMIT.safe_stretch):
         return ()
-    proof = _reach_towards(finger.scene, state.load)
-    if not proof.near:
+    proof = _limit_towards(finger.scene, state.load)
+    if not proof.is_near_fold:
         return ()
     limit = "depth" if proof.by_depth else "friction"
     return (
-        f"The skin is squeezed to {100 * proof.least:.0f} % of its length at one place and folds at "
-        f"{100 * proof.search.folds:.0f} %: this is within some 2 % of the largest {limit} with settled sliding, which "
-        "is known as well.",
+        f"The skin is squeezed to {100 * proof.least_stretch:.0f} % of its length at one place and folds at "
+        f"{100 * proof.search.critical_stretch:.0f} %: this is within some 2 % of the largest {limit} with settled "
+        "sliding, which is known as well.",
     )
 
 
-def _reach_towards(scene: Scene, load: LoadState) -> Reach:
+def _limit_towards(scene: Scene, load: LoadState) -> ContinuationLimit:
     """Return the range of the branch by friction, or by depth where only that reaches `load`.
 
     Where nearly all skin is shear-limited, states hardly depend on mu, so that its limit is ill-conditioned. Deep in
     the tissue skin folds without friction, and slides with some: there the branch by friction has no first state.
     """
     if load.frictionless:
-        return reach_in_depth(scene, load)
+        return depth_limit(scene, load)
     try:
-        proof = reach_in_friction(scene, load, load.mu)
+        proof = friction_limit(scene, load, load.mu)
     except NotConverged:
-        return reach_in_depth(scene, load)
-    if proof.limited:
+        return depth_limit(scene, load)
+    if proof.ends_early:
         with suppress(NotConverged):
-            deepest = reach_in_depth(scene, load)
-            return proof if deepest.limited else deepest
+            deepest = depth_limit(scene, load)
+            return proof if deepest.ends_early else deepest
     return proof
 
 
-def _refusal(scene: Scene, load: LoadState, proof: Reach) -> NoSteadyState | NotConverged:
+def _no_slide(scene: Scene, load: LoadState, proof: ContinuationLimit) -> NoSteadyState | NotConverged:
     """Return the failure with both limits, each only where no state lies a little beyond it.
 
     A branch in depth alone is a limit where the skin folds.
     """
     if proof.by_depth:
-        if not proof.near:
+        if not proof.is_near_fold:
             return _undecided(load, proof)
         return NoSteadyState(
             f"At mu = {load.mu:.3g} there is settled sliding up to {proof.value:.4g} mm of indentation, but not at "
@@ -158,18 +158,19 @@ def _refusal(scene: Scene, load: LoadState, proof: Reach) -> NoSteadyState | Not
             limit_indentation=proof.value,
         )
     largest, depth = proof.value, None
-    if not _none_at(scene, load._replace(mu=(1.0 + BEYOND_LIMIT) * largest), load):
+    if not _has_no_slide(scene, load._replace(mu=(1.0 + BEYOND_LIMIT) * largest), load):
         return _undecided(load, proof)
     ends = (
         "the skin behind the contact folds"
-        if proof.near or all(tissue.law != "ogden" for tissue in scene.materials.by_region)
-        else f"friction is largest there, with the skin behind the contact squeezed to {100 * proof.least:.0f} %"
+        if proof.is_near_fold or all(tissue.law != "ogden" for tissue in scene.materials.by_region)
+        else "friction is largest there, with the skin behind the contact squeezed to "
+        f"{100 * proof.least_stretch:.0f} %"
     )
     beyond = ""
     with suppress(NotConverged):
-        deepest = reach_in_depth(scene, load)
+        deepest = depth_limit(scene, load)
         further = load._replace(depth=(1.0 + BEYOND_LIMIT) * deepest.value)
-        if deepest.ends and _none_at(scene, further, load):
+        if deepest.is_certain and _has_no_slide(scene, further, load):
             depth = deepest.value
             beyond = f", and with this friction up to {depth:.4g} mm"
     return NoSteadyState(
@@ -180,7 +181,7 @@ def _refusal(scene: Scene, load: LoadState, proof: Reach) -> NoSteadyState | Not
     )
 
 
-def _undecided(load: LoadState, proof: Reach) -> NotConverged:
+def _undecided(load: LoadState, proof: ContinuationLimit) -> NotConverged:
     depth, mu = f"{load.depth:.3g} mm of indentation", f"mu = {load.mu:.3g}"
     there, end, here = (
         (mu, f"{proof.value:.3g} mm of indentation", depth)
@@ -193,7 +194,7 @@ def _undecided(load: LoadState, proof: Reach) -> NotConverged:
     )
 
 
-def _none_at(scene: Scene, further: LoadState, load: LoadState) -> bool:
+def _has_no_slide(scene: Scene, further: LoadState, load: LoadState) -> bool:
     """Return whether `further`, a little beyond a limit, has no state along the other parameter's branch.
 
     A limit of depth is checked by friction, a limit of friction by depth. Nothing is checked beyond `load`, which has
@@ -202,17 +203,17 @@ def _none_at(scene: Scene, further: LoadState, load: LoadState) -> bool:
     if further.depth >= load.depth and further.mu >= load.mu:
         return True
     shallower = further.depth < load.depth
-    proof = reach_in_friction(scene, further, load.mu) if shallower else reach_in_depth(scene, further)
-    return proof.ends
+    proof = friction_limit(scene, further, load.mu) if shallower else depth_limit(scene, further)
+    return proof.is_certain
 
 
-def _agrees(finger: FiniteFinger, state: EquilibriumState, proof: Reach) -> bool:
+def _agrees(finger: FiniteFinger, state: EquilibriumState, proof: ContinuationLimit) -> bool:
     """Return whether a state agrees with the end of the branch on another mesh, and is not folded."""
     if is_folded(finger, state):
         return False
     change, force = finger.numbers([state])[0] - proof.numbers, proof.numbers[1:]
     size = np.array([proof.numbers[0], *[np.hypot(*force)] * 2])  # a drag without friction is round-off
-    return bool(np.all(np.abs(change) <= ALIKE * size))
+    return bool(np.all(np.abs(change) <= AGREEMENT * size))
 
 
 def slide_from_limited_skin(newton: Newton, load: LoadState, tolerance: float) -> EquilibriumState:

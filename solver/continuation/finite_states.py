@@ -12,7 +12,7 @@ from solver.body.skin import SkinCompression, crosses_itself
 from solver.body.validation import check_loads
 from solver.constitutive import Law
 from solver.contact import ForceLoad, LoadState
-from solver.continuation import LARGEST_MU, Continuation, folds_at, jumped_branch
+from solver.continuation import LARGEST_MU, Continuation, critical_stretch, jumped_branch
 from solver.continuation.existence import (
     BEYOND_LIMIT,
     is_mostly_shear_limited,
@@ -20,7 +20,7 @@ from solver.continuation.existence import (
     proven_slide,
     slide_from_limited_skin,
 )
-from solver.continuation.limit_point import Reach, reach_in_depth
+from solver.continuation.limit_point import ContinuationLimit, depth_limit
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, Newton, Termination, load_stepping
 from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import march, slide_or_hold
@@ -34,12 +34,12 @@ from solver.scene import Scene
 class ForceSearch:
     """Control of the search for a nearby state, and for the depth at which the normal force is the given one."""
 
-    leading: float = 1e-4  # tolerance of intermediate states, by the length scale of the body
-    beyond: float = 1.5  # ratio of the largest depth searched to the one from which the force did not grow
-    tolerance: float = 1e-9  # relative tolerance of the normal force
-    searches: int = 20  # steps of the search for the depth, at most
-    furthest: float = 0.25  # largest relative change of the depth in a step
-    least_det: float = 0.3  # det F below which the mesh, and not the body, ends a branch
+    intermediate_tolerance: float = 1e-4  # of displacements, by the length scale of the body
+    depth_factor: float = 1.5  # ratio of the largest depth searched to the one from which the force did not grow
+    force_tolerance: float = 1e-9  # of the normal force, relative
+    max_searches: int = 20  # steps for the depth
+    max_depth_change: float = 0.25  # relative, in a step
+    min_det: float = 0.3  # det F below which the mesh, and not the body, ends a branch
 
 
 FORCE_SEARCH = ForceSearch()
@@ -47,21 +47,21 @@ FORCE_SEARCH = ForceSearch()
 # between both, which estimates the error. They end once a twentieth of it remains. In 48 scenes at finite strain,
 # 1e-10 mm in its place took half as long again, and changed estimates by 2e-5 in the median and 7 % at most. Half of
 # the part or double of it changed no more.
-ON_NESTED_MESH = Termination(part=0.05, limit=10)
+ON_NESTED_MESH = Termination(relative_to_first=0.05, max_iterations=10)
 
 
 def settled_state(
-    finger: FiniteFinger, scene: Scene, start: EquilibriumState | None = None, times: float = 1.0
+    finger: FiniteFinger, scene: Scene, start: EquilibriumState | None = None, step_factor: float = 1.0
 ) -> EquilibriumState:
     """Return the settled state of a scene; the search begins at `start`, a proven state nearby.
 
-    A state that depends on its load path takes `times` the usual load steps, and its load has no sense. Raises
-    NoSteadyState, NotConverged, Cancelled.
+    A state that depends on its load path takes `step_factor` times the usual load steps, and its load has no sense.
+    Raises NoSteadyState, NotConverged, Cancelled.
     """
     if scene.loading.direction == 0 and scene.friction.mu > 0.0:
-        return march(scene, finger, times).last
+        return march(scene, finger, step_factor).last
     if scene.normal_force is not None:
-        return _state_under_force(finger, scene, scene.normal_force, start, times)
+        return _state_under_force(finger, scene, scene.normal_force, start, step_factor)
     return proven_slide(finger, sliding_load(scene), start=start)
 
 
@@ -70,11 +70,11 @@ def slide_near(finger: FiniteFinger, scene: Scene, start: EquilibriumState) -> E
     newton, force = finger.newton, scene.normal_force
     try:
         if force is None:
-            state = newton.settle(start, sliding_load(scene), ON_NESTED_MESH)
+            state = newton.solve(start, sliding_load(scene), ON_NESTED_MESH)
         else:
             near = replace(start, load=sliding_load(scene)._replace(depth=start.load.depth, travel=start.load.travel))
             state = solve_under_forces(newton, near, ForceLoad(force, None), ON_NESTED_MESH)
-            state = newton.settle(state, state.load, ON_NESTED_MESH)
+            state = newton.solve(state, state.load, ON_NESTED_MESH)
         return state if is_on_branch(finger, state) else None
     except NotConverged:
         return None
@@ -93,17 +93,17 @@ def rough_state(finger: FiniteFinger, scene: Scene, near: EquilibriumState | Non
     load = sliding_load(scene)
     if near is not None:
         with suppress(NotConverged):
-            return load_stepping.solve_full_slip(finger.newton, load, near, FORCE_SEARCH.leading)
-    return load_stepping.solve_full_slip(finger.newton, load, None, FORCE_SEARCH.leading)
+            return load_stepping.solve_full_slip(finger.newton, load, near, FORCE_SEARCH.intermediate_tolerance)
+    return load_stepping.solve_full_slip(finger.newton, load, None, FORCE_SEARCH.intermediate_tolerance)
 
 
 def _state_under_force(
-    finger: FiniteFinger, scene: Scene, force: float, start: EquilibriumState | None, times: float
+    finger: FiniteFinger, scene: Scene, force: float, start: EquilibriumState | None, step_factor: float
 ) -> EquilibriumState:
     """Return the settled state under given forces, with unknown depth and travel. Raises as `settled_state`."""
 
     def hold() -> EquilibriumState:
-        return march(scene, finger, times).last
+        return march(scene, finger, step_factor).last
 
     if start is not None and start.load.sense == 0:  # the end of a load path, no start for a slide
         start = None
@@ -146,7 +146,9 @@ def _sliding_under(
     if at_bound:
         with suppress(NotConverged):
             *_, bare = _increase_force(newton, load._replace(mu=0.0), force)
-            begin = slide_from_limited_skin(newton, load._replace(depth=bare.load.depth), FORCE_SEARCH.leading)
+            begin = slide_from_limited_skin(
+                newton, load._replace(depth=bare.load.depth), FORCE_SEARCH.intermediate_tolerance
+            )
             state = _at_force(newton, begin, force)
             return proven_slide(finger, state.load, start=state)
     states: list[EquilibriumState] = []
@@ -156,8 +158,8 @@ def _sliding_under(
     except NotConverged as failure:
         if states:
             return _slide_deeper(finger, states[-1], force)
-        proof = reach_in_depth(scene, load._replace(depth=scene.finger.bone_depth()))
-        if proof.ends and proof.numbers[1] < force:  # even the deepest slide carries less
+        proof = depth_limit(scene, load._replace(depth=scene.finger.bone_depth()))
+        if proof.is_certain and proof.numbers[1] < force:  # even the deepest slide carries less
             raise _beyond(proof.value, float(proof.numbers[1])) from failure
         raise
     *before, last = states
@@ -177,18 +179,17 @@ def _increase_force(newton: Newton, load: LoadState, force: float) -> Iterator[E
 def _at_force(newton: Newton, start: EquilibriumState, force: float) -> EquilibriumState:
     """Return the slide with a normal `force` [N/mm], by Newton's method for its depth. Raises NotConverged."""
     state, depth = start, start.load.depth
-    for _ in range(FORCE_SEARCH.searches):
+    for _ in range(FORCE_SEARCH.max_searches):
         state = load_stepping.solve_full_slip(newton, state.load._replace(depth=depth), state)
-        if abs(state.force[1] / force - 1.0) < FORCE_SEARCH.tolerance:
+        if abs(state.force[1] / force - 1.0) < FORCE_SEARCH.force_tolerance:
             return state
         if not newton.linearise(state, state.load, newton.skin_x):
             break
-        stiffness = float(newton.follows(newton.steps)[1, BY_DEPTH])
+        stiffness = float(newton.force_changes(newton.steps)[1, BY_DEPTH])
         if not stiffness > 0.0:
             break
-        depth += float(
-            np.clip((force - state.force[1]) / stiffness, -FORCE_SEARCH.furthest * depth, FORCE_SEARCH.furthest * depth)
-        )
+        largest = FORCE_SEARCH.max_depth_change * depth
+        depth += float(np.clip((force - state.force[1]) / stiffness, -largest, largest))
     raise NotConverged(f"No depth was found at which the finger presses with {force:.4g} N/mm: give a depth instead.")
 
 
@@ -198,15 +199,15 @@ def _slide_deeper(finger: FiniteFinger, state: EquilibriumState, force: float) -
     `limit_point` finds the largest depth and its force. Where a slightly deeper state exists nevertheless, the search
     continues there. Raises as `settled_state`.
     """
-    proof = reach_in_depth(finger.scene, state.load._replace(depth=FORCE_SEARCH.beyond * state.load.depth))
-    if proof.ends and proof.numbers[1] < force:
+    proof = depth_limit(finger.scene, state.load._replace(depth=FORCE_SEARCH.depth_factor * state.load.depth))
+    if proof.is_certain and proof.numbers[1] < force:
         state = _slide_reaching_force(finger, state, proof, force)
     state = _at_force(finger.newton, state, force)
     return proven_slide(finger, state.load, start=state)
 
 
 def _slide_reaching_force(
-    finger: FiniteFinger, state: EquilibriumState, proof: Reach, force: float
+    finger: FiniteFinger, state: EquilibriumState, proof: ContinuationLimit, force: float
 ) -> EquilibriumState:
     """Return a slide beyond the limit depth of `proof` with a normal force of `force` [N/mm] or more.
 
@@ -261,12 +262,12 @@ def solve_dead_load(
         condensed.load[:] = present + part * (vector - present)
         u = state.u.copy()
         u[driven] = held_at + part * motion
-        state = newton.settle(replace(state, u=u), load)
+        state = newton.solve(replace(state, u=u), load)
 
     def refusal(fraction: float, _part: float, reason: NotConverged) -> NotConverged:
         return NotConverged(f"no equilibrium was found beyond {fraction:.3g} of the loads: {reason}")
 
-    load_stepping.advance(step, refusal, load_stepping.StepControl(first=1.0 / steps))
+    load_stepping.advance(step, refusal, load_stepping.StepControl(first_step=1.0 / steps))
     return state
 
 
@@ -292,11 +293,11 @@ def steady_body(
     newton = Newton(body.condensed)
     branch_body = _OwnBody(body, newton)
     bare = load_stepping.solve_full_slip(newton, load._replace(mu=0.0), start)
-    branch = Continuation(branch_body, BY_FRICTION, folds_at(skin)).branch(bare, min(load.mu, LARGEST_MU))
+    branch = Continuation(branch_body, BY_FRICTION, critical_stretch(skin)).branch(bare, min(load.mu, LARGEST_MU))
     where = f"at {load.depth:.4g} mm settled sliding was followed up to mu = {branch.value:.3g}"
-    if branch.limited and (branch.lost or branch_body.is_unusable(branch.last)):
+    if branch.ends_early and (branch.corrector_failed or branch_body.is_unusable(branch.last)):
         raise NotConverged(f"{where} and lost there; whether there is any at mu = {load.mu:.3g} is not known")
-    if branch.limited:
+    if branch.ends_early:
         raise NoSteadyState(f"{where}, where it ends on this mesh", limit_mu=branch.value)
     state = load_stepping.solve_full_slip(newton, load, branch.last)
     if jumped_branch(branch_body, branch.last, state):
@@ -319,8 +320,8 @@ class _OwnBody:
 
     def crosses(self, state: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
-        return crosses_itself(self.newton.condensed.place(state.u))
+        return crosses_itself(self.newton.condensed.skin_positions(state.u))
 
     def is_unusable(self, state: EquilibriumState) -> bool:
         """Return whether contact has come to an end of the skin, or an element is crushed."""
-        return state.reaches_end or self.body.smallest_det(state.u) < FORCE_SEARCH.least_det
+        return state.reaches_end or self.body.smallest_det(state.u) < FORCE_SEARCH.min_det

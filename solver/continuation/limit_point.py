@@ -11,7 +11,7 @@ from functools import lru_cache
 
 from solver.arrays import Array
 from solver.contact import LoadState
-from solver.continuation import BRANCH, LARGEST_MU, Branch, Continuation, folds_at
+from solver.continuation import BRANCH, LARGEST_MU, Branch, Continuation, critical_stretch
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState
 from solver.equilibrium.finger import FiniteFinger, finite_laws
 from solver.equilibrium.load_stepping import solve_full_slip
@@ -28,26 +28,26 @@ _MARGIN = 6.0  # by the indentation: height of the undeformed skin up to which c
 class LimitControl:
     """Which states may begin or end a branch; least stretches of the skin, and fractions."""
 
-    smooth: float = 0.66  # stretch above which states of the coarse mesh agree with those of the fine one
-    sound: float = 0.65  # stretch of a state from which others may start: neo-Hookean surfaces fold at 0.54
-    plain: float = 0.71  # stretch above which a state needs no proof: meshes just below a limit have up to 0.70
-    astray: float = 0.1  # distance of the fold from its expected place, by the tip radius, for another mesh
-    starts: tuple[float, ...] = (0.3, 0.1, 0.03, 0.01)  # fractions of the depth at which its branch may begin
-    nearly: float = 0.02  # stretch above the folding one that counts as near a limit: some 2 % of the friction
+    resolved_stretch: float = 0.66  # above it, states of the coarse mesh agree with those of the fine one
+    sound_stretch: float = 0.65  # from which others may start: neo-Hookean surfaces fold at 0.54
+    safe_stretch: float = 0.71  # above it, a state needs no proof: meshes just below a limit have up to 0.70
+    max_fold_shift: float = 0.1  # from its expected place, by the tip radius: beyond, another mesh is made
+    start_fractions: tuple[float, ...] = (0.3, 0.1, 0.03, 0.01)  # of the depth at which its branch may begin
+    near_fold: float = 0.02  # above the critical stretch: some 2 % of the friction
 
 
 LIMIT = LimitControl()
 
 
-def is_sound(finger: FiniteFinger, state: EquilibriumState, least: float = LIMIT.sound) -> bool:
+def is_sound(finger: FiniteFinger, state: EquilibriumState, least: float = LIMIT.sound_stretch) -> bool:
     """Return whether the skin is stretched to more than `least` everywhere, without a crease or self-contact."""
     compression = finger.skin_compression(state)
-    return compression.lowest >= least and compression.kink <= BRANCH.crease and not finger.crosses(state)
+    return compression.least_stretch >= least and compression.kink <= BRANCH.max_kink and not finger.crosses(state)
 
 
 def is_folded(finger: FiniteFinger, state: EquilibriumState) -> bool:
     """Return whether the skin has a crease or crosses itself."""
-    return finger.skin_compression(state).kink > BRANCH.crease or finger.crosses(state)
+    return finger.skin_compression(state).kink > BRANCH.max_kink or finger.crosses(state)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,9 +60,9 @@ class BranchSearch:
     target: float  # its last value
 
     @property
-    def folds(self) -> float:
+    def critical_stretch(self) -> float:
         """The stretch at which the skin folds [-]."""
-        return folds_at(finite_laws(self.scene.materials)[EPIDERMIS])
+        return critical_stretch(finite_laws(self.scene.materials)[EPIDERMIS])
 
     def finger(self, fold: float | None = None) -> FiniteFinger:
         """Return the finger on a coarse mesh, or on one that is fine at the arc position of a `fold` [mm]."""
@@ -82,16 +82,16 @@ class BranchSearch:
         return self._on(finger).trace(start, self.last, length)
 
     def _on(self, finger: FiniteFinger) -> Continuation:
-        return Continuation(finger, self.parameter, self.folds)
+        return Continuation(finger, self.parameter, self.critical_stretch)
 
     def stop(self, finger: FiniteFinger, branch: Branch) -> Branch:
         """Return a branch up to the target, which one step from LARGEST_MU reaches."""
         branch = self._on(finger).stop_at(branch, self.last)
-        if branch.limited or self.last == self.target:
+        if branch.ends_early or self.last == self.target:
             return branch
         load = branch.last.load._replace(mu=self.target)
         last = solve_full_slip(finger.newton, load, branch.last, BRANCH.tolerance)
-        return Branch((*branch.states, last), self.target, limited=False)
+        return Branch((*branch.states, last), self.target, ends_early=False)
 
     def trace_on_fine_mesh(
         self, finger: FiniteFinger, states: tuple[EquilibriumState, ...]
@@ -106,15 +106,15 @@ class BranchSearch:
         """Return the state at which the branch begins. Raises NotConverged."""
         if self.parameter == BY_FRICTION:
             return solve_full_slip(finger.newton, self.load, None, BRANCH.tolerance)
-        for part in LIMIT.starts:
+        for part in LIMIT.start_fractions:
             with suppress(NotConverged):
                 load = self.load._replace(depth=part * self.target)
                 start = solve_full_slip(finger.newton, load, None, BRANCH.tolerance)
                 if is_sound(finger, start):
                     return start
         raise NotConverged(
-            f"no sliding state was found at mu = {self.load.mu:.3g} even at {LIMIT.starts[-1] * self.target:.3g} "
-            "mm: ask for less friction"
+            f"no sliding state was found at mu = {self.load.mu:.3g} even at "
+            f"{LIMIT.start_fractions[-1] * self.target:.3g} mm: ask for less friction"
         )
 
     def _start_on_fine_mesh(
@@ -122,7 +122,7 @@ class BranchSearch:
     ) -> EquilibriumState:
         """Return the state on the `fine` mesh of the last of `states` that the `rough` mesh resolves."""
         for state in reversed(states):
-            if rough.skin_compression(state).lowest < LIMIT.smooth:
+            if rough.skin_compression(state).least_stretch < LIMIT.resolved_stretch:
                 continue
             with suppress(NotConverged):
                 start = solve_full_slip(fine.newton, state.load, fine.transfer(state, rough), BRANCH.tolerance)
@@ -132,25 +132,25 @@ class BranchSearch:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reach:
+class ContinuationLimit:
     """The range of a branch of settled slides, from zero friction or from a small depth."""
 
     search: BranchSearch
     value: float  # friction coefficient or depth [mm] at its end: the target, or the largest
-    limited: bool  # whether the branch ends there
-    lost: bool  # whether only the corrector failed there, so that the branch may continue
-    least: float  # least stretch of the skin at its last state [-]
+    ends_early: bool  # whether the branch ends there
+    corrector_failed: bool  # whether only the corrector failed there, so that the branch may continue
+    least_stretch: float  # least stretch of the skin at its last state [-]
     numbers: Array  # (3,) SED of the ending, normal and tangential force at its last state
 
     @property
-    def ends(self) -> bool:
+    def is_certain(self) -> bool:
         """Whether the branch is known to end there."""
-        return self.limited and not self.lost
+        return self.ends_early and not self.corrector_failed
 
     @property
-    def near(self) -> bool:
+    def is_near_fold(self) -> bool:
         """Whether the last state lies near a limit."""
-        return self.least < self.search.folds + LIMIT.nearly
+        return self.least_stretch < self.search.critical_stretch + LIMIT.near_fold
 
     @property
     def by_depth(self) -> bool:
@@ -158,22 +158,24 @@ class Reach:
         return self.search.parameter == BY_DEPTH
 
 
-def reach_in_friction(scene: Scene, load: LoadState, target: float) -> Reach:
+def friction_limit(scene: Scene, load: LoadState, target: float) -> ContinuationLimit:
     """Return the range of slides at the depth and bound of `load`, from mu = 0 to `target`.
 
     Raises NotConverged where not even the frictionless state is found, Cancelled.
     """
-    return _reach(
+    return _continuation_limit(
         BranchSearch(scene.frictionless_press(SHALLOW), load._replace(mu=0.0, travel=0.0), BY_FRICTION, target)
     )
 
 
-def reach_in_depth(scene: Scene, load: LoadState) -> Reach:
+def depth_limit(scene: Scene, load: LoadState) -> ContinuationLimit:
     """Return the range of slides at the friction of `load`, from a small depth to that of `load`.
 
     Raises NotConverged where no slide is found even at a hundredth of that depth, Cancelled.
     """
-    return _reach(BranchSearch(scene.frictionless_press(SHALLOW), load._replace(travel=0.0), BY_DEPTH, load.depth))
+    return _continuation_limit(
+        BranchSearch(scene.frictionless_press(SHALLOW), load._replace(travel=0.0), BY_DEPTH, load.depth)
+    )
 
 
 PIECES = (LARGEST_MU / 8.0, LARGEST_MU / 4.0, LARGEST_MU / 2.0, LARGEST_MU)  # ends of pieces of branches in friction
@@ -189,33 +191,34 @@ def _coarse_branch(search: BranchSearch) -> Branch:
     if search.parameter == BY_DEPTH or search.target == PIECES[0]:
         return search.trace(finger, search.start(finger))
     before = _coarse_branch(search.to(search.target / 2.0))
-    if before.limited:
+    if before.ends_early:
         return before
     after = search.trace(finger, before.last, before.length)
     return replace(after, states=(*before.states, *after.states[1:]))
 
 
 @lru_cache(maxsize=32)
-def _reach(search: BranchSearch) -> Reach:
+def _continuation_limit(search: BranchSearch) -> ContinuationLimit:
     """Return the range of a branch, cached because all meshes of a scene need the same."""
     by_depth = search.parameter == BY_DEPTH
     coarse = _coarse_branch(search if by_depth else search.to(min(end for end in PIECES if end >= search.last)))
     if coarse.value < search.last < LARGEST_MU and not by_depth:
-        end = _reach(search.to(LARGEST_MU))
-        if end.limited and end.value < search.target:
+        end = _continuation_limit(search.to(LARGEST_MU))
+        if end.ends_early and end.value < search.target:
             return end
     finger = search.finger()
     branch = search.stop(finger, coarse)
-    if branch.limited or not is_sound(finger, branch.last, LIMIT.plain):
+    if branch.ends_early or not is_sound(finger, branch.last, LIMIT.safe_stretch):
         finger, branch, place = search.trace_on_fine_mesh(finger, branch.states)
-        if abs(_place_of_least_stretch(finger, branch.last) - place) > LIMIT.astray * search.scene.finger.tip_radius:
+        shift = abs(_place_of_least_stretch(finger, branch.last) - place)
+        if shift > LIMIT.max_fold_shift * search.scene.finger.tip_radius:
             finger, branch, _ = search.trace_on_fine_mesh(finger, branch.states)
-    least = finger.skin_compression(branch.last).least
+    least = finger.skin_compression(branch.last).least_chord
     numbers = finger.numbers([branch.last])[0]
-    return Reach(search, float(branch.value), branch.limited, branch.lost, least, numbers)
+    return ContinuationLimit(search, float(branch.value), branch.ends_early, branch.corrector_failed, least, numbers)
 
 
 def _place_of_least_stretch(finger: FiniteFinger, state: EquilibriumState) -> float:
     """Return the arc position of the least stretch of the skin [mm]."""
-    place = finger.skin_compression(state).place
+    place = finger.skin_compression(state).element
     return float(finger.geometry.arcs[place : place + 2].mean())

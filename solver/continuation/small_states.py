@@ -26,24 +26,24 @@ from solver.mesh.mesher import Sizing
 from solver.scene import Scene
 from solver.scene.tables import SHALLOW, Friction, SceneError
 
-WIDE = 16.0  # margin with which nearly all the palmar skin may touch
+WIDE_MARGIN = 16.0  # margin with which nearly all the palmar skin may touch
 _FINENESS = 7.0  # of the meshes for limits of depth and force, which hardly depend on the mesh
-ROUGH = 6.0  # of the mesh for depths under a force, accurate to some tenths of a per cent
-COVERED = 0.9  # ratio of the depth a mesh is made for to the highest skin in contact: it covers 1.25 times its depth
-NEARLY = 0.5  # ratio of drag to friction limit from which a dragged finger is about as deep as a sliding one
-DEEPEST = 0.85  # of the tissue between first contact and bone: beyond, small strain is meaningless
+COARSE_FINENESS = 6.0  # of the mesh for depths under a force, accurate to some tenths of a per cent
+COVERED_SHARE = 0.9  # depth a mesh is made for, by the highest skin in contact: it covers 1.25 times its depth
+NEAR_SLIDING = 0.5  # ratio of drag to friction limit from which a dragged finger is about as deep as a sliding one
+MAX_DEPTH_SHARE = 0.85  # of the tissue between first contact and bone: beyond, small strain is meaningless
 
 
 @dataclass(frozen=True, slots=True)
 class LimitSearch:
     """Control of the search for a limit of friction, depth or force."""
 
-    finer: float = 1.6  # ratio of finenesses of the mesh that confirms a limit of depth
-    beyond: float = 2.0  # ratio of the largest depth searched to the largest that occurred under growing forces
-    patience: int = 15  # systems for the contact states of a step, at most
-    least: float = 1e-3  # smallest fraction of a depth or force that is tried
-    close: float = 0.005  # relative step of mu at which the search for its limit ends
-    nudge: float = 1e-4  # relative increase of a given force that shows whether the finger gives way
+    fineness_ratio: float = 1.6  # of the mesh that confirms a limit of depth
+    depth_factor: float = 2.0  # ratio of the largest depth searched to the largest that occurred under growing forces
+    max_systems: int = 15  # for the contact states of a step
+    min_fraction: float = 1e-3  # of a depth or force that is tried
+    mu_tolerance: float = 0.005  # relative, at which the search for its limit ends
+    force_increment: float = 1e-4  # relative, which shows whether the finger gives way
 
 
 LIMIT_SEARCH = LimitSearch()
@@ -62,10 +62,10 @@ def continue_in_friction(
         state = full_slip(newton, load._replace(mu=0.0)) if first is None else first
     except ContactLost:
         return None, 0.0
-    while mu < load.mu and step > LIMIT_SEARCH.close * max(mu, min(0.01, load.mu)):
+    while mu < load.mu and step > LIMIT_SEARCH.mu_tolerance * max(mu, min(0.01, load.mu)):
         aim = min(mu + step, load.mu)
         try:
-            further = slide_from_guess(newton, load._replace(mu=aim), state.state, force, LIMIT_SEARCH.patience)
+            further = slide_from_guess(newton, load._replace(mu=aim), state.state, force, LIMIT_SEARCH.max_systems)
         except ContactLost:
             step /= 2.0
             continue
@@ -81,7 +81,7 @@ def continue_in_friction(
     return None, 0.0 if unknown else mu
 
 
-class Bodies:
+class FingerCache:
     """A cache of one finger on meshes for depths around powers of two."""
 
     def __init__(self, scene: Scene) -> None:
@@ -98,7 +98,7 @@ class Bodies:
 
     def build_for(self, depth: float, fineness: float) -> Newton:
         """Return a body with a new mesh."""
-        return LinearFinger.of(self._scene, Sizing(fineness, depth, margin=WIDE)).newton
+        return LinearFinger.of(self._scene, Sizing(fineness, depth, margin=WIDE_MARGIN)).newton
 
 
 def limits(scene: Scene, load: LoadState) -> tuple[float | None, float | None]:
@@ -106,16 +106,16 @@ def limits(scene: Scene, load: LoadState) -> tuple[float | None, float | None]:
 
     Both are less than the scene's. The force is None where the scene prescribes a depth; unknown limits are None.
     """
-    bodies = Bodies(scene)
+    bodies = FingerCache(scene)
     if scene.normal_force is None:
         return None, _deepest(bodies, load, scene.loading.depth)
     strongest = _strongest(bodies, scene, scene.normal_force, load)
     if strongest is None:
         return None, None
-    return strongest[0], _deepest(bodies, load, LIMIT_SEARCH.beyond * strongest[1], strongest[1])
+    return strongest[0], _deepest(bodies, load, LIMIT_SEARCH.depth_factor * strongest[1], strongest[1])
 
 
-def _deepest(bodies: Bodies, load: LoadState, high: float, low: float | None = None) -> float | None:
+def _deepest(bodies: FingerCache, load: LoadState, high: float, low: float | None = None) -> float | None:
     """Return the largest indentation [mm] between `low` and `high` with settled sliding.
 
     None where there is none, or where a finer mesh disagrees, as it does at coefficients far beyond the limit.
@@ -124,18 +124,18 @@ def _deepest(bodies: Bodies, load: LoadState, high: float, low: float | None = N
     def slides(depth: float) -> bool:
         return continue_in_friction(bodies.at(depth), load._replace(depth=depth))[0] is not None
 
-    least = LIMIT_SEARCH.least * high
+    least = LIMIT_SEARCH.min_fraction * high
     while low is None:
         if high < least:
             return None
         low, high = (high / 2.0, high) if slides(high / 2.0) else (None, high / 2.0)
     deepest = _largest(slides, low, high)
-    finer = bodies.build_for(deepest, LIMIT_SEARCH.finer * _FINENESS)
+    finer = bodies.build_for(deepest, LIMIT_SEARCH.fineness_ratio * _FINENESS)
     ends = [continue_in_friction(finer, load._replace(depth=part * deepest))[0] is None for part in (0.97, 1.03)]
     return deepest if ends == [False, True] else None
 
 
-def _strongest(bodies: Bodies, scene: Scene, force: float, load: LoadState) -> tuple[float | None, float] | None:
+def _strongest(bodies: FingerCache, scene: Scene, force: float, load: LoadState) -> tuple[float | None, float] | None:
     """Return the largest normal force [N/mm] below `force` with settled sliding, and the largest depth [mm] tried.
 
     The force is None where a finer mesh disagrees; the result is None where there is no slide.
@@ -157,10 +157,10 @@ def _strongest(bodies: Bodies, scene: Scene, force: float, load: LoadState) -> t
             return state is not None
         return False
 
-    if not slides(LIMIT_SEARCH.least * force):
+    if not slides(LIMIT_SEARCH.min_fraction * force):
         return None
-    most = _largest(slides, LIMIT_SEARCH.least * force, force)
-    finer = bodies.build_for(rubless(most), LIMIT_SEARCH.finer * _FINENESS)
+    most = _largest(slides, LIMIT_SEARCH.min_fraction * force, force)
+    finer = bodies.build_for(rubless(most), LIMIT_SEARCH.fineness_ratio * _FINENESS)
     ends = [slide_at(finer, part * most) is None for part in (0.97, 1.03)]
     return most if ends == [False, True] else None, max(depths)
 
@@ -173,19 +173,19 @@ def _largest(exists: Callable[[float], bool], low: float, high: float) -> float:
     return sqrt(low * high)
 
 
-def settled_state(scene: Scene, finger: LinearFinger, times: float = 1.0) -> EquilibriumState:
-    """Return the settled state: a slide directly, a path-dependent one in `times` the usual load steps.
+def settled_state(scene: Scene, finger: LinearFinger, step_factor: float = 1.0) -> EquilibriumState:
+    """Return the settled state: a slide directly, a path-dependent one in `step_factor` times the usual load steps.
 
     Raises NotConverged, ContactLost where no slide was found, and NoSteadyState where the given drag exceeds friction.
     """
     load, loading, newton = sliding_load(scene), scene.loading_per_mm, finger.newton
     if loading.direction == 0 and not load.frictionless:
-        return march(scene, finger, times).last
+        return march(scene, finger, step_factor).last
     if loading.normal_force is None:
         return full_slip(newton, load)
-    force, deepest = loading.normal_force, DEEPEST * scene.finger.pulp_thickness()
+    force, deepest = loading.normal_force, MAX_DEPTH_SHARE * scene.finger.pulp_thickness()
     return slide_or_hold(
-        scene, lambda: slide_under(newton, load, force, deepest), lambda: march(scene, finger, times).last
+        scene, lambda: slide_under(newton, load, force, deepest), lambda: march(scene, finger, step_factor).last
     )
 
 
@@ -197,7 +197,7 @@ def follow_friction(scene: Scene, finger: LinearFinger) -> tuple[EquilibriumStat
     load, force = sliding_load(scene), scene.normal_force
     if force is None:
         return continue_in_friction(finger.newton, load)
-    deepest = DEEPEST * scene.finger.pulp_thickness()
+    deepest = MAX_DEPTH_SHARE * scene.finger.pulp_thickness()
     try:
         first = slide_under(finger.newton, load._replace(mu=0.0), force, deepest)
     except ContactLost:
@@ -208,13 +208,14 @@ def follow_friction(scene: Scene, finger: LinearFinger) -> tuple[EquilibriumStat
     return state, limit
 
 
-def gives_way(scene: Scene, finger: LinearFinger, state: EquilibriumState) -> bool:
+def is_unstable_under_force(scene: Scene, finger: LinearFinger, state: EquilibriumState) -> bool:
     """Return whether a settled slide under a given force would be less deep under a little more force."""
     force = scene.normal_force
     if force is None or scene.loading.direction == 0 or state.sticking > 0.0:
         return False
     try:
-        harder = slide_from_guess(finger.newton, sliding_load(scene), state.state, (1.0 + LIMIT_SEARCH.nudge) * force)
+        more = (1.0 + LIMIT_SEARCH.force_increment) * force
+        harder = slide_from_guess(finger.newton, sliding_load(scene), state.state, more)
     except ContactLost:
         return False
     return harder.load.depth < state.load.depth
@@ -269,15 +270,15 @@ def nearest_state(scene: Scene, finger: LinearFinger) -> EquilibriumState:
         return state
 
 
-def proven_state(scene: Scene, finger: LinearFinger, times: float = 1.0) -> EquilibriumState:
-    """Return the settled state, a path-dependent one after `times` the usual load steps.
+def proven_state(scene: Scene, finger: LinearFinger, step_factor: float = 1.0) -> EquilibriumState:
+    """Return the settled state, a path-dependent one after `step_factor` times the usual load steps.
 
     Near or beyond a limit, guesses can converge to states to which no slide leads. Where none was found, or a folded
     one, only the state followed from mu = 0 counts. Raises NoSteadyState, NotConverged.
     """
     direction = scene.loading.direction
     try:
-        state = settled_state(scene, finger, times)
+        state = settled_state(scene, finger, step_factor)
         # a state to which no slide leads has an element turned inside out
         if direction == 0 or state.load.path_dependent or finger.body.smallest_det(finger.displacement(state)) > 0.0:
             return state
@@ -285,14 +286,14 @@ def proven_state(scene: Scene, finger: LinearFinger, times: float = 1.0) -> Equi
     except ContactLost as lost:
         why = str(lost)
     if direction == 0:
-        raise _no_answer(scene, why, 0.0)
+        raise _no_slide(scene, why, 0.0)
     state, limit = follow_friction(scene, finger)
     if state is None:
-        raise _no_answer(scene, why, limit)
+        raise _no_slide(scene, why, limit)
     return state
 
 
-def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotConverged:
+def _no_slide(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotConverged:
     """Return the failure of a scene without a slide, with the limits that are known."""
     force = scene.normal_force
     conditions = f"{scene.loading.depth:g} mm indentation" if force is None else f"a normal force of {force:g} N/mm"
@@ -329,7 +330,7 @@ def matching_depths(scenes: Sequence[Scene], normal_forces: Sequence[float]) -> 
     """
     if not scenes:
         return ()
-    deepest = DEEPEST * scenes[0].finger.pulp_thickness()
+    deepest = MAX_DEPTH_SHARE * scenes[0].finger.pulp_thickness()
     finger = _finger(scenes[0].frictionless_press(deepest), get_ident())
     states = [_rough_slide(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True)]
     return tuple(None if state is None else state.load.depth for state in states)
@@ -340,7 +341,7 @@ def expected_depth(scene: Scene) -> float:
     force = scene.normal_force
     if force is None:
         return scene.loading.depth
-    deepest = DEEPEST * scene.finger.pulp_thickness()
+    deepest = MAX_DEPTH_SHARE * scene.finger.pulp_thickness()
     try:
         finger = _finger(scene.frictionless_press(deepest), get_ident())
     except (SceneError, NotConverged):  # the solve itself will report it
@@ -348,7 +349,7 @@ def expected_depth(scene: Scene) -> float:
     state = _rough_slide(finger, scene, force, deepest)
     drag = scene.tangential_force or 0.0
     is_static = scene.loading.direction == 0 or scene.loading.dragged
-    if is_static and (state is None or drag < NEARLY * abs(state.force[0])):
+    if is_static and (state is None or drag < NEAR_SLIDING * abs(state.force[0])):
         # Then it is about as deep as one that slides under the same drag.
         friction = Friction(min(drag / force, float(scene.friction.mu)), scene.friction.tau_max)
         state = _rough_slide(finger, replace(scene, friction=friction), force, deepest)
@@ -356,7 +357,7 @@ def expected_depth(scene: Scene) -> float:
         return deepest
     # A strong drag lifts the bone, and yet more skin comes into contact, which the mesh must cover.
     highest = float(finger.body.condensed.rest[state.touching, 1].max())
-    return max(state.load.depth, COVERED * highest, SHALLOW)
+    return max(state.load.depth, COVERED_SHARE * highest, SHALLOW)
 
 
 def check_depth(scene: Scene, depth: float, most: float | None = None) -> None:
@@ -387,7 +388,7 @@ def check_depth(scene: Scene, depth: float, most: float | None = None) -> None:
 @lru_cache(maxsize=1)
 def _finger(bare: Scene, _thread: int) -> LinearFinger:
     """Return the finger on a coarse mesh, cached for consecutive surfaces of one finger in one thread."""
-    return LinearFinger.of(bare, Sizing(ROUGH, bare.loading.depth))
+    return LinearFinger.of(bare, Sizing(COARSE_FINENESS, bare.loading.depth))
 
 
 def _rough_slide(finger: LinearFinger, scene: Scene, normal_force: float, deepest: float) -> EquilibriumState | None:

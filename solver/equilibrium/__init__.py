@@ -41,18 +41,18 @@ class NewtonControl:
     more than 6e-10, and the number of tangents by 3 % at most. Without keeping tangents there are 5 % more.
     """
 
-    shortest: float = 1.0 / 16.0  # smallest part of a step that is tried where the whole turns the body inside out
-    stride: float = 0.02  # largest change of depth or travel in one iteration where forces are given
-    rounds: int = 12  # changes of contact states within one linearisation: its systems are small, and so cheap
-    near: float = 0.01  # first step below which the tangent of the state before is kept
-    fast: float = 0.02  # ratio of consecutive steps below which a new tangent is kept
-    slow: float = 0.5  # the same ratio, above which a kept tangent is renewed
-    turn: float = 1e-3  # step times bulk over shear stiffness, above which no tangent is kept
-    patience: int = 20  # most systems for the contact states of a linear body, beside four for each node
-    margin: float = 0.5  # part of the tolerance that the remaining step, as estimated, may take
-    same: float = 1e-3  # relative difference below which two steps count as equal
-    repeats: int = 4  # equal steps in a row that count as a cycle
-    unbounded: float = 100.0  # displacement from which the body counts as loose
+    min_damping: float = 1.0 / 16.0  # smallest part of a step, where the whole turns the body inside out
+    max_increment: float = 0.02  # of depth or travel in one iteration, where forces are given
+    max_rounds: int = 12  # changes of contact states within one linearisation: its systems are small, and so cheap
+    reuse_step: float = 0.01  # first step below which the tangent of the state before is kept
+    reuse_ratio: float = 0.02  # ratio of consecutive steps below which a new tangent is kept
+    renewal_ratio: float = 0.5  # the same ratio, above which a kept tangent is renewed
+    reuse_bulk_step: float = 1e-3  # step times bulk over shear stiffness, above which no tangent is kept
+    max_systems: int = 20  # for the contact states of a linear body, beside four for each node
+    error_share: float = 0.5  # part of the tolerance that the remaining step, as estimated, may take
+    cycle_tolerance: float = 1e-3  # relative difference below which two steps count as equal
+    cycle_steps: int = 4  # equal steps in a row that count as a cycle
+    divergence: float = 100.0  # displacement from which the body counts as loose
 
 
 CONTROL = NewtonControl()
@@ -62,8 +62,8 @@ class Termination(NamedTuple):
     """When the iterations for an equilibrium end: at the larger of two errors, or with a failure at the limit."""
 
     tolerance: float = 1e-11  # of displacements, by the length scale of the body [-]
-    part: float = 0.0  # of displacements, by the largest of the first step [-]
-    limit: int = 25  # iterations, at most
+    relative_to_first: float = 0.0  # of displacements, by the largest of the first step [-]
+    max_iterations: int = 25
 
 
 TO_ROUND_OFF = Termination()
@@ -92,13 +92,13 @@ class EquilibriumState:
         zero = np.zeros(len(body.held), np.int32)
         return EquilibriumState(u, pressure, zero, zero, np.zeros((len(zero), 2)), load.validate(), 0)
 
-    def place(self, body: CondensedBody) -> Array:
+    def skin_positions(self, body: CondensedBody) -> Array:
         """Return the deformed positions of the skin's nodes (k, 2) [mm]."""
-        return body.place(self.u)
+        return body.skin_positions(self.u)
 
     def anchor(self, body: CondensedBody) -> Anchor:
         """Return where nodes stick in a step from this state: their places, moved with the surface."""
-        origin, travel = self.place(body)[:, 0].copy(), self.load.travel
+        origin, travel = self.skin_positions(body)[:, 0].copy(), self.load.travel
         return lambda load: origin + (load.travel - travel)
 
     @property
@@ -149,11 +149,11 @@ class Newton:
         self.bulk, self.length_scale = condensed.bulk, condensed.length_scale
         self.skin = Skin(condensed.held, condensed.middle, condensed.fixed_length)
         self._rest = condensed.undeformed()[0]
-        self.skin_x = condensed.place(self._rest)[:, 0].copy()
+        self.skin_x = condensed.skin_positions(self._rest)[:, 0].copy()
         zero = np.zeros(skin, np.int32)
         self._states = ContactStates(zero, zero.copy(), np.zeros((skin, 2)))
         self._active_set = bind_arguments(active_set.solve_active_set, self.system)
-        self._meet = bind_arguments(active_set.update_contact_states, self.skin, self.system.length)
+        self._update_states = bind_arguments(active_set.update_contact_states, self.skin, self.system.length)
 
     def linearise(
         self,
@@ -183,7 +183,7 @@ class Newton:
         """Solve the contact of the linearised body at `state`; return the result of `solve_active_set`."""
         body = self.condensed
         self._states.state[:], self._states.sense[:] = state.state, state.sense
-        stride = np.inf if body.constant else CONTROL.stride * self.length_scale
+        max_increment = np.inf if body.constant else CONTROL.max_increment * self.length_scale
         kind, drag, push = DEPTH_CONTROL, 0.0, 0.0
         if forces is not None:
             kind = PUSH_CONTROL if forces.tangential is None else DRAG_CONTROL
@@ -191,7 +191,7 @@ class Newton:
         return self._active_set(
             self.arrays(), body.compliance, self.skin, self._states, load_arguments(load),
             self._position(state.u, load, anchor),
-            ContactControl(kind, float(drag), float(push), stride, rounds),
+            ContactControl(kind, float(drag), float(push), max_increment, rounds),
         )  # fmt: skip
 
     def arrays(self) -> CondensedArrays:
@@ -201,10 +201,10 @@ class Newton:
 
     def _position(self, u: Array, load: LoadState, anchor: Array) -> SkinPosition:
         """Return the position of the skin relative to the surface at displacements `u`."""
-        place = self.condensed.place(u)
+        place = self.condensed.skin_positions(u)
         return SkinPosition(place[:, 0].copy(), place[:, 1] - load.depth, anchor)
 
-    def follows(self, steps: Array) -> Array:
+    def force_changes(self, steps: Array) -> Array:
         """Return the changes of the surface's force along x and y (2, c) by `steps` of the skin (2 k, c)."""
         return self.condensed.stiffness.reshape(-1, 2, len(steps)).sum(axis=0) @ steps
 
@@ -216,7 +216,7 @@ class Newton:
         reaction = (body.force + body.stiffness @ skin).reshape(-1, 2)
         u, pressure, largest = body.recover(state.u, state.pressure, skin, scale)
         states = ContactStates(self._states.state.copy(), self._states.sense.copy(), reaction)
-        changes = self._meet(states, self._position(u, load, anchor), load_arguments(load))
+        changes = self._update_states(states, self._position(u, load, anchor), load_arguments(load))
         return EquilibriumState(u, pressure, *states, load, state.iterations + 1), largest, changes
 
     def correct(
@@ -231,7 +231,7 @@ class Newton:
         corrected, largest, changes = self.apply_step(state, load, self.steps[:, EQUILIBRIUM], anchor(load), scale)
         return corrected, max(largest, abs(deeper), abs(along)), changes
 
-    def settle(
+    def solve(
         self, start: EquilibriumState, load: LoadState, termination: Termination = TO_ROUND_OFF
     ) -> EquilibriumState:
         """Return the equilibrium under `load`, from `start`.
@@ -241,17 +241,17 @@ class Newton:
         after the iterations of `termination`, or where the body would turn inside out.
         """
         states = ContactStates(start.state.copy(), start.sense.copy(), start.reaction)
-        position = self._position(start.u, load, start.place(self.condensed)[:, 0].copy())
-        self._meet(states, position, load_arguments(load))
+        position = self._position(start.u, load, start.skin_positions(self.condensed)[:, 0].copy())
+        self._update_states(states, position, load_arguments(load))
         begin = replace(start, state=states.state, sense=states.sense, load=load)
         if self.condensed.constant and self.condensed.motions.shape[1]:
             begin = lower_onto_surface(self.condensed, begin)
-        return self.settle_from(begin, start, None, termination)
+        return self.solve_from(begin, start, None, termination)
 
-    def settle_from(
+    def solve_from(
         self, begin: EquilibriumState, start: EquilibriumState, forces: ForceLoad | None, termination: Termination
     ) -> EquilibriumState:
-        """Return the equilibrium one step from `start`, as `settle` does, with iterations that begin at `begin`.
+        """Return the equilibrium one step from `start`, as `solve` does, with iterations that begin at `begin`.
 
         Depth and travel are those of `begin`; those that are not prescribed follow from `forces`.
         """
@@ -260,7 +260,7 @@ class Newton:
         anchor = start.anchor(self.condensed)
         if self.condensed.constant:
             return self.solve_linear(begin, begin.load, anchor(begin.load), forces)
-        rounds = CONTROL.rounds if forces is None else 0  # more of them lose drags near the friction limit
+        rounds = CONTROL.max_rounds if forces is None else 0  # more of them lose drags near the friction limit
 
         def linearise(state: EquilibriumState, *, reuse: bool = False) -> bool:
             return self.linearise(state, state.load, anchor(state.load), rounds, forces, reuse=reuse)
@@ -275,7 +275,7 @@ class Newton:
         reuse = self.condensed.equilibrium is begin.u
         size = self.length_scale
         scale, first, last, new, equal_steps = 1.0, 0.0, 0.0, False, 0
-        for _ in range(termination.limit):
+        for _ in range(termination.max_iterations):
             if reuse:
                 if not linearise(state, reuse=True):
                     reuse = False
@@ -283,31 +283,31 @@ class Newton:
                 previous = state
             elif not linearise(state):
                 scale /= 2.0  # the last step went too far
-                if state is previous or scale < CONTROL.shortest or not linearise(previous):
+                if state is previous or scale < CONTROL.min_damping or not linearise(previous):
                     raise NotConverged("the body would turn inside out, or nothing holds it along the surface")
                 state = previous
             elif state is not previous:
                 previous, scale = state, min(1.0, 2.0 * scale)
             state, largest, changes = self.correct(previous, anchor, scale)
-            if not largest < CONTROL.unbounded * size:
+            if not largest < CONTROL.divergence * size:
                 raise NotConverged("the displacements grow without bound")
             first = first or largest
             fall = min(largest / last, 1.0) if last > 0.0 else 1.0
-            equal_steps = equal_steps + 1 if changes and abs(largest - last) <= CONTROL.same * last else 0
-            if equal_steps == CONTROL.repeats:
+            equal_steps = equal_steps + 1 if changes and abs(largest - last) <= CONTROL.cycle_tolerance * last else 0
+            if equal_steps == CONTROL.cycle_steps:
                 raise NotConverged("states of contact come again and again")
             remainder = min((2.0 * fall) ** 2 if not reuse else 4.0 * fall if new else 2.0 * fall, 1.0)
-            accuracy = max(termination.tolerance * size, termination.part * first)
-            if largest * remainder < CONTROL.margin * accuracy and not changes and scale == 1.0:
+            accuracy = max(termination.tolerance * size, termination.relative_to_first * first)
+            if largest * remainder < CONTROL.error_share * accuracy and not changes and scale == 1.0:
                 self.condensed.equilibrium = state.u
                 return state
             new = not reuse
-            still = largest < CONTROL.near * size if last == 0.0 else fall < CONTROL.slow
+            still = largest < CONTROL.reuse_step * size if last == 0.0 else fall < CONTROL.renewal_ratio
             # A kept tangent has turned by then. Its step changes volume to second order, which a stiff body resists.
-            may_turn = self.bulk * largest < CONTROL.turn * size
-            reuse = (still if reuse else fall < CONTROL.fast and scale == 1.0) and may_turn
+            may_turn = self.bulk * largest < CONTROL.reuse_bulk_step * size
+            reuse = (still if reuse else fall < CONTROL.reuse_ratio and scale == 1.0) and may_turn
             last = largest
-        raise NotConverged(f"no equilibrium within {termination.limit} iterations")
+        raise NotConverged(f"no equilibrium within {termination.max_iterations} iterations")
 
     def solve_linear(
         self,
@@ -323,7 +323,7 @@ class Newton:
         """
         self.systems += 1
         self.condensed.relinearise(self._rest)  # any state is one step away
-        rounds = CONTROL.patience + 4 * len(self.skin_x) if rounds is None else rounds
+        rounds = CONTROL.max_systems + 4 * len(self.skin_x) if rounds is None else rounds
         count = self.solve_contact(replace(state, u=self._rest), load, anchor, rounds, forces)
         if count == SINGULAR:
             raise ContactLost("the touching points have no unique forces")
@@ -347,7 +347,7 @@ def lower_onto_surface(body: CondensedBody, start: EquilibriumState) -> Equilibr
     if start.touching.any():
         return start
     state, count = start.state.copy(), max(body.motions.shape[1], 1)
-    lowest = np.argsort(start.place(body)[:, 1], kind="stable")[:count]
+    lowest = np.argsort(start.skin_positions(body)[:, 1], kind="stable")[:count]
     state[lowest] = SLIP if start.load.frictionless else STICK
     return replace(start, state=state)
 

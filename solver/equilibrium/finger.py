@@ -146,7 +146,7 @@ class Finger(ABC, Generic[PatchKind]):
 
     def contact_width(self, state: EquilibriumState) -> float:
         """Return the width of the contact along the surface [mm]."""
-        x = state.place(self.newton.condensed)[:, 0]
+        x = state.skin_positions(self.newton.condensed)[:, 0]
         return width(self.arcs, x, state.normal, state.touching)
 
     @cached_property
@@ -177,7 +177,7 @@ class LinearFinger(Finger[LinearPatches]):
     def ending_by_skin(self) -> Array:
         """A matrix B (a, 2 k) with which the reference ending's SED is |B u|^2 for displacements u of the skin."""
         endings, elastic = self.ending.endings, self.body.elastic
-        local = elastic.state(elastic.places(endings.probes), self.body.every_step())  # (p, 2 k)
+        local = elastic.state(elastic.probe_data(endings.probes), self.body.unit_displacements())  # (p, 2 k)
         weights = np.sqrt(endings.weights / endings.areas)[:, None]
         strain = np.sqrt(local.shear) * np.stack([local.xx, local.yy, local.engineering_shear / np.sqrt(2.0)])
         lines = np.vstack([*(weights * strain), weights * np.sqrt(local.lame / 2.0) * local.dilatation])
@@ -223,16 +223,16 @@ class FiniteFinger(Finger[FinitePatches]):
         return WeakKeyDictionary()
 
     @cached_property
-    def places(self) -> "Places":
+    def places(self) -> "GridPositions":
         """Positions of nodes and quadrature points, for transfers."""
-        return Places.of(self.geometry, self.body)
+        return GridPositions.of(self.geometry, self.body)
 
     def skin_compression(self, state: EquilibriumState) -> SkinCompression:
         """Return the compression of the skin, with its least stretch and its kinks."""
         mesh, skin = self.geometry.mesh, self.geometry.all_skin
         touching = np.zeros(len(skin), bool)
         touching[np.searchsorted(skin, mesh.skin)] = state.touching
-        return SkinCompression.of(mesh.nodes[skin], state.u[skin], self.geometry.loose, touching)
+        return SkinCompression.of(mesh.nodes[skin], state.u[skin], self.geometry.away_from_held, touching)
 
     def crosses(self, state: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
@@ -266,7 +266,7 @@ def _finite(tissue: Material, moduli: Moduli) -> Law:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Places:
+class GridPositions:
     """Positions of the nodes and quadrature points of a mesh: arc positions [mm] and heights.
 
     Heights are 0 on the bone, 1 between fat and skin, 2 on the outside.
@@ -282,22 +282,22 @@ class Places:
     lengths: Array  # (k,) their tributary lengths along the arc [mm]
 
     @staticmethod
-    def of(finger: FingerMesh, body: FiniteBody) -> "Places":
+    def of(finger: FingerMesh, body: FiniteBody) -> "GridPositions":
         """Return the places of a mesh."""
         arcs, heights = with_middles(finger.arcs), _heights(finger)
         skin = finger.skin_arcs
         lengths = np.empty(len(skin))
         tributary(skin, body.middle, lengths)
         points = VALUES @ finger.mesh.local(finger.mesh.nodes)
-        return Places(body, arcs, heights, _inner(arcs[::2]), _inner(heights[::2]), points, skin, lengths)
+        return GridPositions(body, arcs, heights, _inner(arcs[::2]), _inner(heights[::2]), points, skin, lengths)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshTransfer:
     """Interpolation from one mesh to another of the same finger."""
 
-    old: Places
-    new: Places
+    old: GridPositions
+    new: GridPositions
     along: Indices  # (2 a + 1,) first of the three old lines along the skin for each new one
     along_parts: Array  # (2 a + 1, 3) their weights
     across: Indices  # (2 b + 1,) the same of rows
@@ -309,7 +309,7 @@ class MeshTransfer:
     driven: Flags  # (nodes, 2) held components of the new nodes
 
     @staticmethod
-    def of(old: Places, new: Places) -> "MeshTransfer":
+    def of(old: GridPositions, new: GridPositions) -> "MeshTransfer":
         """Return the interpolation from the `old` to the `new` mesh."""
         along, across = _interpolation(old.arcs, new.arcs), _interpolation(old.heights, new.heights)
         station = _piece(old.arcs[::2], new.inner_arcs)

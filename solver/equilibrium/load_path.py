@@ -1,6 +1,6 @@
 """The load path of a finger in time: a press over 1 s, then a slide until the state is settled, or a drag.
 
-Where tissues relax, a wait for their relaxation follows. `CourseSteps` has the load steps.
+Where tissues relax, a wait for their relaxation follows. `LoadSteps` has the load steps.
 """
 
 from collections.abc import Callable
@@ -28,47 +28,55 @@ from solver.scene.tables import Loading, Materials
 
 PRESSING_TIME = 1.0  # duration of the press [s]
 DRAGGING_TIME = 1.0  # duration of the growth of a given tangential force [s]
-ALL_SLIPS = 1e-6  # relative difference of a given drag from the friction limit at which all slips
-SED_STILL = 1e-10  # relative change of the ending's SED per step below which a slide at finite strain is settled
-_CONTROL = StepControl(smallest=2.0**-13, growth=2.0)
+FULL_SLIP_TOLERANCE = 1e-6  # relative difference of a given drag from the friction limit at which all slips
+SED_TOLERANCE = 1e-10  # relative change of the ending's SED per step below which a slide at finite strain is settled
+_CONTROL = StepControl(min_step=2.0**-13, step_growth=2.0)
 Report = Callable[[str, float], None]  # called with a text and the fraction of the load path that is done
 
 
 @dataclass(frozen=True, slots=True)
-class CourseSteps:
+class LoadSteps:
     """The load steps of a path; lengths are relative to the indentation."""
 
-    press: int  # number of steps of the press, and of a drag
-    first: float  # first step of a slide
-    growth: float  # ratio of consecutive steps of a slide
-    largest: float  # largest step of a slide
-    furthest: float  # slide after which a state that still changes is refused
-    plateau: int = 0  # steps beyond the settled state, which show that it stays
+    press_steps: int  # of a drag too
+    first_slide_step: float
+    slide_growth: float  # ratio of consecutive steps
+    max_slide_step: float
+    max_slide: float  # after which a state that still changes is refused
+    plateau_steps: int = 0  # beyond the settled state, which show that it stays
     tolerance: float = 0.0  # of displacements; a body of constant stiffness needs none
 
-    def finer(self, times: float) -> "CourseSteps":
-        """Return `times` as many steps."""
-        press = round(self.press * times)
-        return replace(self, press=press, first=self.first / times, largest=self.largest / times)
+    def finer(self, step_factor: float) -> "LoadSteps":
+        """Return `step_factor` times as many steps."""
+        return replace(
+            self,
+            press_steps=round(self.press_steps * step_factor),
+            first_slide_step=self.first_slide_step / step_factor,
+            max_slide_step=self.max_slide_step / step_factor,
+        )
 
 
-SMALL_STEPS = CourseSteps(25, first=0.01, growth=1.2, largest=0.06, furthest=100.0, plateau=4)
-_FINITE = CourseSteps(40, first=0.1, growth=1.0, largest=0.1, furthest=8.0, tolerance=1e-7)
-RELAXING = CourseSteps(25, first=0.02, growth=1.2, largest=0.1, furthest=25.0, tolerance=1e-8)
-LONG = 25.0  # slide by the indentation within which states settle, except near the wedging limit
+SMALL_STEPS = LoadSteps(
+    25, first_slide_step=0.01, slide_growth=1.2, max_slide_step=0.06, max_slide=100.0, plateau_steps=4
+)
+FINITE_STEPS = LoadSteps(40, first_slide_step=0.1, slide_growth=1.0, max_slide_step=0.1, max_slide=8.0, tolerance=1e-7)
+RELAXING_STEPS = LoadSteps(
+    25, first_slide_step=0.02, slide_growth=1.2, max_slide_step=0.1, max_slide=25.0, tolerance=1e-8
+)
+USUAL_SLIDE = 25.0  # slide by the indentation within which states settle, except near the wedging limit
 
 
 @dataclass(frozen=True, slots=True)
-class Waiting:
+class RelaxationSteps:
     """The steps of the wait for relaxation at the end of a load path."""
 
-    shortest: float = 14.0  # shortest wait by the largest relaxation time: e^-14 is 8e-7
-    equal: int = 6  # steps of equal length before it doubles
-    still: float = 1e-6  # relative change of the SED over equal steps below which it is relaxed
-    doublings: int = 60  # of the step, at most
+    min_wait: float = 14.0  # by the largest relaxation time: e^-14 is 8e-7
+    equal_steps: int = 6  # of one length, before it doubles
+    sed_tolerance: float = 1e-6  # relative change of the SED over equal steps below which it is relaxed
+    max_doublings: int = 60  # of the step
 
 
-WAITING = Waiting()
+RELAXATION_STEPS = RelaxationSteps()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,16 +97,16 @@ class Instant:
         return 0.0 - self.state.load.travel
 
 
-class Aim(NamedTuple):
+class LoadPoint(NamedTuple):
     """The prescribed motion or forces of the bone at an instant."""
 
     time: float  # [s]
     press: float  # depth [mm], or a given normal force [N/mm]
     along: float  # travel along +x [mm], or a given tangential force on the skin along +x [N/mm]
 
-    def towards(self, target: "Aim", part: float) -> "Aim":
-        """Return the aim a `part` of the way to `target`."""
-        return Aim(*(a + part * (b - a) for a, b in zip(self, target, strict=True)))
+    def towards(self, target: "LoadPoint", part: float) -> "LoadPoint":
+        """Return the point a `part` of the way to `target`."""
+        return LoadPoint(*(a + part * (b - a) for a, b in zip(self, target, strict=True)))
 
 
 class LoadPath:
@@ -127,39 +135,39 @@ class LoadPath:
         self.by_drag = loading.dragged and not self.frictionless
         start = EquilibriumState.undeformed(newton.condensed, LoadState(0.0, friction.mu, friction.tau))
         self.instants = [Instant(0.0, start)]
-        self.aim = Aim(0.0, 0.0, 0.0)
+        self.point = LoadPoint(0.0, 0.0, 0.0)
 
     @property
     def last(self) -> EquilibriumState:
         """The last state."""
         return self.instants[-1].state
 
-    def go(self, aim: Aim) -> None:
-        """Append the state at `aim`; a step that fails is halved, and its intermediate states are appended too."""
-        begin = self.aim
+    def advance_to(self, point: LoadPoint) -> None:
+        """Append the state at `point`; a step that fails is halved, and its intermediate states are appended too."""
+        begin = self.point
 
         def step(part: float) -> None:
-            step_aim = aim if part == 1.0 else begin.towards(aim, part)
-            self.instants.append(Instant(step_aim.time, self.solve_step(self.last, step_aim)))
-            self.aim = step_aim
+            step_point = point if part == 1.0 else begin.towards(point, part)
+            self.instants.append(Instant(step_point.time, self.solve_step(self.last, step_point)))
+            self.point = step_point
 
         advance(step, self._refusal, _CONTROL)
 
     def _refusal(self, _fraction: float, _part: float, reason: NotConverged) -> NotConverged:
         return at_end_of_path(self.last.load.depth, self.last.load.travel, reason)
 
-    def solve_step(self, previous: EquilibriumState, aim: Aim) -> EquilibriumState:
-        """Return the state at `aim` one step from `previous`, and advance the tissues. Raises NotConverged."""
-        step = aim.time - self.aim.time
+    def solve_step(self, previous: EquilibriumState, point: LoadPoint) -> EquilibriumState:
+        """Return the state at `point` one step from `previous`, and advance the tissues. Raises NotConverged."""
+        step = point.time - self.point.time
         if self.tissue is not None:
             self.newton = self.tissue.ready(step)
             previous = replace(previous, load=previous.load._replace(sense=self.sense))
         if self.by_force:
-            forces = ForceLoad(aim.press, aim.along) if self.by_drag else ForceLoad(aim.press, None, -aim.along)
+            forces = ForceLoad(point.press, point.along) if self.by_drag else ForceLoad(point.press, None, -point.along)
             state = solve_under_forces(self.newton, lower_onto_surface(self.newton.condensed, previous), forces)
         else:
-            load = previous.load._replace(depth=aim.press, travel=-aim.along)
-            state = self.newton.settle(previous, load, self._termination)
+            load = previous.load._replace(depth=point.press, travel=-point.along)
+            state = self.newton.solve(previous, load, self._termination)
         if self.tissue is not None:
             self.energies.append(self.tissue.commit(state, step))
         return state
@@ -168,28 +176,28 @@ class LoadPath:
 def march(
     scene: Scene,
     finger: Finger[Patches],
-    times: float = 1.0,
+    step_factor: float = 1.0,
     *,
     relaxing: bool = False,
     report: Report = report_progress,
 ) -> LoadPath:
     """Return the load path of a scene by backward Euler steps: the press, then settled slides or a drag.
 
-    It takes `times` the usual steps. With `relaxing` the tissues relax, and a wait for them ends the path; else they
-    are relaxed from the start. A given drag must be less than the friction limit. Raises NotConverged where a step
-    fails or a slide does not settle, Cancelled.
+    It takes `step_factor` times the usual steps. With `relaxing` the tissues relax, and a wait for them ends the path;
+    else they are relaxed from the start. A given drag must be less than the friction limit. Raises NotConverged where a
+    step fails or a slide does not settle, Cancelled.
     """
-    steps, loading = steps_of(finger, relaxing=relaxing).finer(times), scene.loading_per_mm
+    steps, loading = steps_of(finger, relaxing=relaxing).finer(step_factor), scene.loading_per_mm
     path = undeformed_path(scene, finger, relaxing=relaxing)
-    follow(path, finger, loading, steps, times, report)
+    apply_loading(path, finger, loading, steps, step_factor, report)
     if path.tissue is not None:
-        _wait(path, loading, scene.materials.longest_creep, times, report)
+        _relax(path, loading, scene.materials.longest_creep, step_factor, report)
     return path
 
 
-def end(scene: Scene, finger: Finger[Patches], times: float = 1.0) -> EquilibriumState:
-    """Return the end of the load path of a scene in `times` the usual steps. Raises as `march`."""
-    return march(scene, finger, times, relaxing=scene.viscoelastic).last
+def end(scene: Scene, finger: Finger[Patches], step_factor: float = 1.0) -> EquilibriumState:
+    """Return the end of the load path of a scene in `step_factor` times the usual steps. Raises as `march`."""
+    return march(scene, finger, step_factor, relaxing=scene.viscoelastic).last
 
 
 def slide_or_hold(
@@ -208,16 +216,16 @@ def slide_or_hold(
             raise
         return hold()
     most = abs(float(state.force[0]))
-    if drag is None or abs(drag - most) <= ALL_SLIPS * most:
+    if drag is None or abs(drag - most) <= FULL_SLIP_TOLERANCE * most:
         return state
     if drag > most:
         raise beyond_friction(drag, most, force or 0.0)
     return hold()
 
 
-def steps_of(finger: Finger[Patches], *, relaxing: bool = False) -> CourseSteps:
+def steps_of(finger: Finger[Patches], *, relaxing: bool = False) -> LoadSteps:
     """Return the usual load steps of a finger."""
-    return SMALL_STEPS if isinstance(finger, LinearFinger) else RELAXING if relaxing else _FINITE
+    return SMALL_STEPS if isinstance(finger, LinearFinger) else RELAXING_STEPS if relaxing else FINITE_STEPS
 
 
 def undeformed_path(scene: Scene, finger: Finger[Patches], *, relaxing: bool = False) -> LoadPath:
@@ -243,38 +251,38 @@ def _relaxing_body(mesh: Mesh, materials: Materials) -> RelaxingBody:
     return RelaxingBody(mesh, relaxing_laws(materials), checked=True)
 
 
-def follow(
-    path: LoadPath, finger: Finger[Patches], loading: Loading, steps: CourseSteps, times: float, report: Report
+def apply_loading(
+    path: LoadPath, finger: Finger[Patches], loading: Loading, steps: LoadSteps, step_factor: float, report: Report
 ) -> None:
     """Append the press, and the slides or the drag. Raises as `march`."""
     press = loading.depth if loading.normal_force is None else loading.normal_force
     share = 1.0 if loading.dragged else 0.5  # of the work, for progress
-    count = steps.press * (2 if loading.dragged else 1)
-    doing = "pressing and dragging step by step" + _why(path)
-    for number in range(1, steps.press + 1):
-        part = number / steps.press
-        path.go(Aim(PRESSING_TIME * part, press * part, 0.0))
+    count = steps.press_steps * (2 if loading.dragged else 1)
+    doing = "pressing and dragging step by step" + _reason(path)
+    for number in range(1, steps.press_steps + 1):
+        part = number / steps.press_steps
+        path.advance_to(LoadPoint(PRESSING_TIME * part, press * part, 0.0))
         report(doing, share * number / count)
     if loading.tangential_force is not None:
         load = -loading.direction * loading.tangential_force
-        for number in range(1, steps.press + 1):
-            part = number / steps.press
-            path.go(Aim(PRESSING_TIME + DRAGGING_TIME * part, press, load * part))
-            report(doing, share * (steps.press + number) / count)
+        for number in range(1, steps.press_steps + 1):
+            part = number / steps.press_steps
+            path.advance_to(LoadPoint(PRESSING_TIME + DRAGGING_TIME * part, press, load * part))
+            report(doing, share * (steps.press_steps + number) / count)
         return
     for direction in loading.directions:
-        _slide(path, direction * loading.speed, steps, _EndOfSlide(path, finger, direction, times), report)
+        _slide(path, direction * loading.speed, steps, _SettlingCriterion(path, finger, direction, step_factor), report)
 
 
-def _why(path: LoadPath) -> str:
+def _reason(path: LoadPath) -> str:
     return ", since the tissues relax" if path.tissue is not None else ""
 
 
-class _EndOfSlide:
+class _SettlingCriterion:
     """Criterion for a settled slide, evaluated before every step."""
 
-    def __init__(self, path: LoadPath, finger: Finger[Patches], direction: int, times: float) -> None:
-        self._path, self._finger, self._direction, self._times = path, finger, direction, times
+    def __init__(self, path: LoadPath, finger: Finger[Patches], direction: int, step_factor: float) -> None:
+        self._path, self._finger, self._direction, self._step_factor = path, finger, direction, step_factor
         self._sed: float | None = None
 
     def __call__(self) -> bool:
@@ -290,35 +298,35 @@ class _EndOfSlide:
         previous = self._sed
         relaxes = self._path.tissue is not None
         sed = self._sed = 0.0 if relaxes else self._finger.sed_ending(state.u)
-        still = previous is not None and (relaxes or abs(sed - previous) * self._times <= SED_STILL * sed)
+        still = previous is not None and (relaxes or abs(sed - previous) * self._step_factor <= SED_TOLERANCE * sed)
         return still and not (state.state == STICK).any()
 
 
-def _slide(path: LoadPath, speed: float, steps: CourseSteps, settled: Callable[[], bool], report: Report) -> None:
+def _slide(path: LoadPath, speed: float, steps: LoadSteps, settled: Callable[[], bool], report: Report) -> None:
     """Append the states of a slide until it is settled, and the plateau beyond. Raises NotConverged."""
-    start, depth = path.aim, path.instants[-1].depth
-    step, distance = steps.first * depth, 0.0
-    direction, longest = np.sign(speed).item(), min(LONG, steps.furthest) * depth
+    start, depth = path.point, path.instants[-1].depth
+    step, distance = steps.first_slide_step * depth, 0.0
+    direction, longest = np.sign(speed).item(), min(USUAL_SLIDE, steps.max_slide) * depth
 
     def go(distance: float) -> None:
-        path.go(Aim(start.time + distance / abs(speed), start.press, start.along + direction * distance))
+        path.advance_to(LoadPoint(start.time + distance / abs(speed), start.press, start.along + direction * distance))
 
     while not settled():
-        if distance >= steps.furthest * depth:
+        if distance >= steps.max_slide * depth:
             raise NotConverged(
                 f"after {distance:.3g} mm of sliding at {depth:.4g} mm of indentation and mu = {path.last.load.mu:.3g} "
                 "the state still changes, as it does where the finger wedges itself in; ask for less friction or depth"
             )
         distance += step
         go(distance)
-        step = min(step * steps.growth, steps.largest * depth)
-        report("sliding step by step until nothing changes" + _why(path), 0.5 + 0.5 * min(distance / longest, 1.0))
+        step = min(step * steps.slide_growth, steps.max_slide_step * depth)
+        report("sliding step by step until nothing changes" + _reason(path), 0.5 + 0.5 * min(distance / longest, 1.0))
     beyond = max(0.3 * distance, depth)
-    for number in range(1, steps.plateau + 1):
-        go(distance + beyond * number / steps.plateau)
+    for number in range(1, steps.plateau_steps + 1):
+        go(distance + beyond * number / steps.plateau_steps)
 
 
-def _wait(path: LoadPath, loading: Loading, slowest: float, times: float, report: Report) -> None:
+def _relax(path: LoadPath, loading: Loading, slowest: float, step_factor: float, report: Report) -> None:
     """Append states in doubling steps until the `slowest` tissue [s] has relaxed, while a slide continues.
 
     Near a limit of sliding a body relaxes more slowly than its tissues, so that the energy must be constant too.
@@ -326,13 +334,15 @@ def _wait(path: LoadPath, loading: Loading, slowest: float, times: float, report
     speed = 0.0 if loading.dragged else loading.direction * loading.speed
     if not isinstance(path.tissue, LinearTissue):
         path.sense = -int(np.sign(speed))  # by now all skin in contact slips
-    step, elapsed, longest = path.instants[-1].time - path.instants[-2].time, 0.0, WAITING.shortest * slowest
-    for _ in range(WAITING.doublings):
+    step, elapsed, longest = path.instants[-1].time - path.instants[-2].time, 0.0, RELAXATION_STEPS.min_wait * slowest
+    for _ in range(RELAXATION_STEPS.max_doublings):
         previous = path.energies[-1][0]
-        for _ in range(ceil(WAITING.equal * times)):
+        for _ in range(ceil(RELAXATION_STEPS.equal_steps * step_factor)):
             report("waiting step by step until the tissues have relaxed", min(elapsed / longest, 1.0))
-            path.go(Aim(path.aim.time + step, path.aim.press, path.aim.along + speed * step))
+            path.advance_to(LoadPoint(path.point.time + step, path.point.press, path.point.along + speed * step))
             elapsed += step
-        if elapsed >= longest and abs(path.energies[-1][0] - previous) <= WAITING.still * abs(path.energies[-1][0]):
+        if elapsed >= longest and abs(path.energies[-1][0] - previous) <= RELAXATION_STEPS.sed_tolerance * abs(
+            path.energies[-1][0]
+        ):
             return
         step *= 2.0

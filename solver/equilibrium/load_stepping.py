@@ -22,25 +22,25 @@ from solver.progress import check_stop, report_progress
 from solver.scene import Scene
 
 DRAG_TOLERANCE = 1e-9  # error of a drag that is met, by the friction limit
-_UNDER_FORCES = Termination(limit=30)  # the depth is searched too
+_UNDER_FORCES = Termination(max_iterations=30)  # the depth is searched too
 
 
 @dataclass(frozen=True, slots=True)
 class StepControl:
     """How a load path is cut into steps; lengths are fractions of the path."""
 
-    first: float = 1.0
-    smallest: float = 2.0**-8
-    growth: float = 1.0  # ratio of the next step to one that succeeded
+    first_step: float = 1.0
+    min_step: float = 2.0**-8
+    step_growth: float = 1.0  # ratio of the next step to one that succeeded
 
 
 Step = Callable[[float], None]
 Refusal = Callable[[float, float, NotConverged], NotConverged]
-WHOLE = StepControl()
+ONE_STEP = StepControl()
 
 
 def advance(
-    step: Step, refusal: Refusal, control: StepControl = WHOLE, exhausted: Callable[[], bool] = lambda: False
+    step: Step, refusal: Refusal, control: StepControl = ONE_STEP, exhausted: Callable[[], bool] = lambda: False
 ) -> None:
     """Call `step` with growing fractions of the path up to 1; halve the step that fails.
 
@@ -48,7 +48,7 @@ def advance(
     work is `exhausted`, this raises the exception that `refusal` returns for the fraction reached, that step and the
     reason. Raises Cancelled.
     """
-    fraction, part = 0.0, control.first
+    fraction, part = 0.0, control.first_step
     while fraction < 1.0:
         check_stop()
         aim = min(fraction + part, 1.0)
@@ -56,10 +56,10 @@ def advance(
             step(aim)
         except NotConverged as reason:
             part /= 2.0
-            if part < control.smallest or exhausted():
+            if part < control.min_step or exhausted():
                 raise refusal(fraction, part, reason) from reason
         else:
-            fraction, part = aim, control.growth * part
+            fraction, part = aim, control.step_growth * part
 
 
 def load_of(scene: Scene) -> LoadState:
@@ -107,15 +107,15 @@ def march(
                 forces = ForceLoad(normal, drag, begin.load.travel).towards(aim, part)
                 state = solve_under_forces(newton, lower_onto_surface(newton.condensed, state), forces)
             else:
-                state = newton.settle(state, begin.load._replace(mu=aim.mu, tau=aim.tau).towards(aim, part), end)
+                state = newton.solve(state, begin.load._replace(mu=aim.mu, tau=aim.tau).towards(aim, part), end)
 
         advance(step, lambda _fraction, _part, why: at_end_of_path(state.load.depth, state.load.travel, why))
         yield state
 
 
 State = TypeVar("State")
-FIRST, FURTHEST = 1e-8, 0.1  # first and largest stride of the search for a bracket, by the length scale of the body
-SEARCHES = 60  # evaluations within the bracket, at most
+_FIRST_STRIDE, _MAX_STRIDE = 1e-8, 0.1  # of the search for a bracket, by the length scale of the body
+_MAX_EVALUATIONS = 60  # within the bracket
 
 
 def find_root(
@@ -131,14 +131,14 @@ def find_root(
     """
     previous = latest = start
     bracket, state = function(start)
-    beyond, stride = bracket, FIRST * size if bracket < 0.0 else -FIRST * size
+    beyond, stride = bracket, _FIRST_STRIDE * size if bracket < 0.0 else -_FIRST_STRIDE * size
     while beyond * bracket > 0.0:
         previous, bracket = latest, beyond
         latest, stride = latest + stride, 2.0 * stride
-        if abs(stride) > FURTHEST * size:
+        if abs(stride) > _MAX_STRIDE * size:
             return None
         beyond, state = function(latest)
-    for _ in range(SEARCHES):
+    for _ in range(_MAX_EVALUATIONS):
         if abs(beyond) <= close:
             return state
         between = latest - beyond * (latest - previous) / (beyond - bracket)
@@ -159,7 +159,7 @@ def solve_under_forces(
     Raises NotConverged.
     """
     try:
-        state = newton.settle_from(start, start, forces, termination)
+        state = newton.solve_from(start, start, forces, termination)
     except ContactLost:  # for example where friction is so small that all but one node slip
         if forces.tangential is None:
             raise
@@ -185,7 +185,7 @@ def _find_travel(
 
     def drag_error(travel: float) -> tuple[float, EquilibriumState]:
         nonlocal near
-        near = newton.settle_from(near, start, ForceLoad(forces.normal, None, travel), termination)
+        near = newton.solve_from(near, start, ForceLoad(forces.normal, None, travel), termination)
         return float(near.force[0]) - drag, near
 
     close = DRAG_TOLERANCE * state.load.mu * forces.normal
@@ -202,12 +202,12 @@ class SlipControl:
     Halving or doubling the numbers for finite strain changed neither states nor tangents of sixteen slides.
     """
 
-    hertz: float = 0.5  # overlap by depth from which skin is guessed to touch: in Hertz' contact half the overlap does
-    short: int = 12  # systems for that guess, at most
-    parts: tuple[float, ...] = (0.3, 0.6, 0.1, 0.9, 0.03, 0.01)  # of the depth: overlaps that are tried in turn
-    leading: float = 1e-4  # tolerance of steps before the last [-]; looser ones diverge near nu = 0.5
-    work: int = 160  # tangents after which no more steps are halved: 80 lose presses deep in the tissue, 320 gain none
-    smallest: float = 1.0 / 64.0  # smallest step, as a part of the path
+    hertz_overlap: float = 0.5  # by depth, from which skin is guessed to touch: in Hertz' contact half does
+    max_hertz_systems: int = 12  # for that guess
+    overlaps: tuple[float, ...] = (0.3, 0.6, 0.1, 0.9, 0.03, 0.01)  # by the depth, tried in turn
+    intermediate_tolerance: float = 1e-4  # tolerance of steps before the last [-]; looser ones diverge near nu = 0.5
+    max_tangents: int = 160  # then no more steps are halved: 80 lose deep presses, 320 gain none
+    min_step: float = 1.0 / 64.0  # by the path
 
 
 SLIP_CONTROL = SlipControl()
@@ -223,17 +223,17 @@ def solve_full_slip(
     """
     load = load.validate()
     if newton.condensed.constant:
-        return _at_once(newton, load, start)
+        return _linear_slide(newton, load, start)
     state = EquilibriumState.undeformed(newton.condensed) if start is None else start
     begin = state.load if start is not None else LoadState(0.0, load.mu, load.tau, load.sense)
-    most = newton.systems + SLIP_CONTROL.work
+    most = newton.systems + SLIP_CONTROL.max_tangents
 
     def step(part: float) -> None:
         nonlocal state
         if part < 1.0:
             report_progress(f"coming to sliding at mu = {load.mu:.3g} in small steps", part)
-        termination = Termination(tolerance if part == 1.0 else SLIP_CONTROL.leading)
-        state = newton.settle(state, begin.towards(load, part), termination)
+        termination = Termination(tolerance if part == 1.0 else SLIP_CONTROL.intermediate_tolerance)
+        state = newton.solve(state, begin.towards(load, part), termination)
 
     def refusal(fraction: float, part: float, reason: NotConverged) -> NotConverged:
         last = begin.towards(load, fraction)
@@ -242,12 +242,12 @@ def solve_full_slip(
             f"steps of 1/{1 / part:.0f} of the way"
         )
 
-    control = StepControl(smallest=1.0 if begin == load else SLIP_CONTROL.smallest)
+    control = StepControl(min_step=1.0 if begin == load else SLIP_CONTROL.min_step)
     advance(step, refusal, control, exhausted=lambda: newton.systems > most)
     return state
 
 
-def _at_once(newton: Newton, load: LoadState, start: EquilibriumState | None) -> EquilibriumState:
+def _linear_slide(newton: Newton, load: LoadState, start: EquilibriumState | None) -> EquilibriumState:
     """Return the settled slide of a body of constant stiffness in one step. Raises ContactLost.
 
     The first guess of its contact is that of `start`, or the skin that overlaps the surface.
@@ -256,11 +256,14 @@ def _at_once(newton: Newton, load: LoadState, start: EquilibriumState | None) ->
         raise ValueError("sense = 0 is not allowed: friction on what slides points along +1 or -1")
     if start is not None:
         return slide_from_guess(newton, load, start.state)
-    height = newton.condensed.place(newton.condensed.undeformed()[0])[:, 1]
+    height = newton.condensed.skin_positions(newton.condensed.undeformed()[0])[:, 1]
     if newton.condensed.motions.shape[1]:  # a rigid motion changes its depth
-        return _first_of(newton, load, float(np.ptp(height)), None)
+        return _slide_from_guesses(newton, load, float(np.ptp(height)), None)
     above = height - load.depth
-    guesses = [(above < -SLIP_CONTROL.hertz * load.depth, SLIP, SLIP_CONTROL.short), (above < 0.0, SLIP, None)]
+    guesses = [
+        (above < -SLIP_CONTROL.hertz_overlap * load.depth, SLIP, SLIP_CONTROL.max_hertz_systems),
+        (above < 0.0, SLIP, None),
+    ]
     if isfinite(load.tau):
         guesses.append((above < 0.0, SHEAR_LIMITED, None))
     for low, slips, rounds in guesses[:-1]:
@@ -289,17 +292,17 @@ def slide_under(newton: Newton, load: LoadState, force: float, deepest: float | 
 
     `deepest` [mm] scales the first guesses of the depth, by default the height of the skin. Raises ContactLost.
     """
-    height = newton.condensed.place(newton.condensed.undeformed()[0])[:, 1]
-    state = _first_of(newton, load, float(np.ptp(height)) if deepest is None else deepest, force)
+    height = newton.condensed.skin_positions(newton.condensed.undeformed()[0])[:, 1]
+    state = _slide_from_guesses(newton, load, float(np.ptp(height)) if deepest is None else deepest, force)
     if deepest is None or state.load.depth > 0.0:
         return state
     raise ContactLost("the touching points have no forces that amount to the normal force")
 
 
-def _first_of(newton: Newton, load: LoadState, scale: float, force: float | None) -> EquilibriumState:
+def _slide_from_guesses(newton: Newton, load: LoadState, scale: float, force: float | None) -> EquilibriumState:
     """Return the first slide found from guesses of contact up to parts of a `scale` [mm] above the lowest node."""
-    height = newton.condensed.place(newton.condensed.undeformed()[0])[:, 1]
-    guesses = [np.where(height <= float(height.min()) + part * scale, SLIP, OPEN) for part in SLIP_CONTROL.parts]
+    height = newton.condensed.skin_positions(newton.condensed.undeformed()[0])[:, 1]
+    guesses = [np.where(height <= float(height.min()) + part * scale, SLIP, OPEN) for part in SLIP_CONTROL.overlaps]
     for guess in guesses[:-1]:
         with suppress(ContactLost):
             state = slide_from_guess(newton, load, guess, force)

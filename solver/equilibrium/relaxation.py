@@ -91,7 +91,7 @@ class RelaxingBody:
             load -= form.elastic.forces(self.mesh.local(motion))
         nodes = self.mesh.assemble(load)
         nodes[self.mesh.driven] = 0.0
-        body, recover = form.under(nodes)
+        body, recover = form.with_loads(nodes)
         self._next = lambda u: recover(u) + motion, step
         return body
 
@@ -168,10 +168,10 @@ class CondensedRelaxing(CondensedFinite):
         self._add(u)
         return super().assemble(u, pressure)
 
-    def resist(self, u: Array) -> float:
+    def assemble_forces(self, u: Array) -> float:
         """Fill the forces at a state, keep the tangent, and return the smallest det F."""
         self._add(u)
-        return super().resist(u)
+        return super().assemble_forces(u)
 
     def _add(self, u: Array) -> None:
         more = self.system.overstress_force, self.system.overstress_tangent

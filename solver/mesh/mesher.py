@@ -174,7 +174,7 @@ class FingerMesh:
     depths: Array  # (b + 1,) depths of the lines between the elements of the skin, outermost last; bone not included
     fat: int  # number of elements below the dermis: of the fat, and of a meshed bone
     all_skin: Indices  # (2 a + 1,) nodes of all the skin, whether they may touch or not
-    loose: NDArray[np.bool_]  # (a,) elements along the skin that are not close to held skin
+    away_from_held: NDArray[np.bool_]  # (a,) elements along the skin that are not close to held skin
 
     @property
     def skin_arcs(self) -> Array:
@@ -209,19 +209,19 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
     long, wide = points.shape[0], points.shape[1]
     number: Indices = np.arange(long * wide, dtype=np.int64).reshape(long, wide)
     held = [number[:, 0]]
-    loose = np.ones(len(arcs) - 1, bool)
+    away_from_held = np.ones(len(arcs) - 1, bool)
     if finger.cut == "driven":
         held += [number[0], number[-1]]
         low, high = max(low, 1), min(high, len(arcs) - 2)
-        loose &= _clear_of_held(arcs, outline.palmar_cut, outline.palmar_cut, finger)
-        loose &= _clear_of_held(arcs, outline.dorsal_cut, outline.dorsal_cut, finger)
+        away_from_held &= _clear_of_held(arcs, outline.palmar_cut, outline.palmar_cut, finger)
+        away_from_held &= _clear_of_held(arcs, outline.dorsal_cut, outline.dorsal_cut, finger)
     if finger.nail_length > 0.0:
         nail = np.flatnonzero((every_arc >= outline.dorsal - 1e-9) & (every_arc <= outline.nail_end + 1e-9))
         held.append(number[nail, -1])
         high = min(high, int(nail[0]) // 2 - 1)
-        loose &= _clear_of_held(arcs, outline.dorsal, outline.nail_end, finger)
+        away_from_held &= _clear_of_held(arcs, outline.dorsal, outline.nail_end, finger)
     mesh = grid_mesh(points, layers, slice(2 * low, 2 * high + 1), distinct(np.concatenate(held)))
-    return FingerMesh(mesh, outline, sizing, base, arcs, depths, below, number[:, -1].copy(), loose)
+    return FingerMesh(mesh, outline, sizing, base, arcs, depths, below, number[:, -1].copy(), away_from_held)
 
 
 @lru_cache(maxsize=8)  # a mesh and its nested mesh have the same

@@ -97,13 +97,17 @@ def prediction(
         geometry=finger.geometry,
         displacement=solution.displacement,
         history=None if solution.path is None else history(scene, finger, solution.path),
-        warnings=(*warnings(driven, entry["left_out"]), *solution.warnings, *audits.rounding(solution.audits)),
+        warnings=(
+            *warnings(driven, entry["left_out"]),
+            *solution.warnings,
+            *audits.round_off_warnings(solution.audits),
+        ),
     )
 
 
 def skin_of(finger: Finger[Patches], state: EquilibriumState) -> Skin:
     """Return positions, tractions and contact states of the skin that may touch."""
-    place, touching, length = state.place(finger.newton.condensed), state.touching, np.empty(len(state.state))
+    place, touching, length = state.skin_positions(finger.newton.condensed), state.touching, np.empty(len(state.state))
     bounded_length(np.ascontiguousarray(place[:, 0]), finger.newton.skin, length)
     length = np.where(touching, length, 1.0)
     return Skin(

@@ -12,7 +12,7 @@ from solver.body.finite import FiniteBody, FinitePatches
 from solver.body.linear import Elastic
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import LinearFinger, finite_laws, settled_moduli
-from solver.equilibrium.load_path import SMALL_STEPS, Instant, follow, undeformed_path
+from solver.equilibrium.load_path import SMALL_STEPS, Instant, apply_loading, undeformed_path
 from solver.failures import SolveFailure
 from solver.mesh import Q2P1, Mesh, local_coordinates
 from solver.mesh.mesher import Outline
@@ -96,7 +96,7 @@ class Sketch:
 
     def values(self, displacement: Array) -> Array:
         """Return `FIELDS` at the nodes of every element (f, 9 e, m) of displacements (nodes, 2, m), small strain."""
-        state = self.elastic.state(self.elastic.places(self.probes), displacement)
+        state = self.elastic.state(self.elastic.probe_data(self.probes), displacement)
         return np.stack([field.small(state) for field in FIELDS])
 
     def fields(self, displacement: Array, indentation: float, values: Array) -> Fields:
@@ -211,7 +211,7 @@ def path_until_failure(
     """
     path = undeformed_path(scene, finger)
     try:
-        follow(path, finger, scene.loading_per_mm, SMALL_STEPS, 1.0, lambda _, part: report_part(progress, part))
+        apply_loading(path, finger, scene.loading_per_mm, SMALL_STEPS, 1.0, lambda _, part: report_part(progress, part))
     except SolveFailure as failure:
         return _before_folding(finger, path.instants), failure
     return tuple(path.instants), None

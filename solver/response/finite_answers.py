@@ -167,20 +167,22 @@ def refine(scene: Scene, fineness: float | Lines, coarse: MeshSolution, meshes: 
     """Return the settled state refined from `coarse`, the scene's coarse solution. Raises as `solution_on`."""
     steps = choose_steps(scene, coarse.finger, coarse.state)
     sizing = replace(coarse.sizing, fineness=fineness)
-    top = solution_on(scene, sizing, coarse, meshes, 1 if steps is None else steps.times)
+    top = solution_on(scene, sizing, coarse, meshes, 1 if steps is None else steps.factor)
     if top.sizing.margin < WIDER and top.state.reaches_end:
         wider = replace(sizing, margin=WIDER)
-        top = solution_on(scene, wider, coarse, meshes, 1 if steps is None else steps.times)
+        top = solution_on(scene, wider, coarse, meshes, 1 if steps is None else steps.factor)
     return NestedSolution(coarse, top, steps)
 
 
-def solution_on(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes, times: int = 1) -> MeshSolution:
+def solution_on(
+    scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes, step_factor: int = 1
+) -> MeshSolution:
     """Return the settled state on a mesh of `sizing`, started from the coarser solution `below`.
 
-    A load path takes so many `times` the usual steps. Raises NoSteadyState, NotConverged, Cancelled.
+    A load path takes `step_factor` times the usual steps. Raises NoSteadyState, NotConverged, Cancelled.
     """
     start = _starting_solution(scene, sizing, below, meshes)
-    return replace(start, state=settled_state(start.finger, scene, start.state, times))
+    return replace(start, state=settled_state(start.finger, scene, start.state, step_factor))
 
 
 def _starting_solution(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes) -> MeshSolution:
@@ -206,7 +208,7 @@ def solve_nested(
         if top.state.load.path_dependent:
             if steps is None:  # since it slid on the coarse mesh
                 choice = choose_steps(scene, top.finger, top.state)
-                steps = None if choice is None else replace(choice, times=1)
+                steps = None if choice is None else replace(choice, factor=1)
             state = end(scene, finger)
         else:
             steps = None
@@ -264,10 +266,10 @@ def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float)
     finger, state, path = top.finger, top.state, None
     setup = nested.coarse.setup_s + top.setup_s
     if scene.solve.course == "history":
-        times = steps_of_press(scene, nested.coarse.finger) if steps is None else steps.times
+        step_factor = steps_of_press(scene, nested.coarse.finger) if steps is None else steps.factor
         for leg in scene.earlier_slides():  # one that never settles is refused with its limits
             settled_state(finger, leg)
-        path = march(scene, finger, times, relaxing=scene.materials.relax)
+        path = march(scene, finger, step_factor, relaxing=scene.materials.relax)
         state = path.last
     if not state.touching.any():
         raise NotConverged(f"No contact was found at {state.load.depth:g} mm of indentation: ask for more depth.")
@@ -298,7 +300,7 @@ def _correct(
 
     `newton` is that of the finger, or of its relaxing tissues; `checks` are the audits of `state`.
     """
-    x = state.place(newton.condensed)[:, 0]
+    x = state.skin_positions(newton.condensed)[:, 0]
     if not newton.linearise(state, state.load, x):
         return None
     corrected = newton.correct(state, lambda _load: x)[0]

@@ -33,7 +33,7 @@ from solver.scene.tables import TISSUES
 _MU, TAU_MAX, _DEPTH = range(3)
 
 
-class By(NamedTuple):
+class Gradient(NamedTuple):
     """The derivatives of one number by each parameter."""
 
     mu: float  # coefficient of friction [-]
@@ -46,37 +46,37 @@ class By(NamedTuple):
 class Derivatives:
     """The derivatives of the numbers of one settled slide."""
 
-    sed: By  # averaged over the ending [MPa]
-    normal: By  # force of the surface on the finger along +y [N/mm]
-    tangential: By  # drag opposing the slide [N/mm]
-    indentation: By  # [mm]
-    responses: Mapping[str, By]  # of every quantity at the ending, by its name
+    sed: Gradient  # averaged over the ending [MPa]
+    normal: Gradient  # force of the surface on the finger along +y [N/mm]
+    tangential: Gradient  # drag opposing the slide [N/mm]
+    indentation: Gradient  # [mm]
+    responses: Mapping[str, Gradient]  # of every quantity at the ending, by its name
 
 
-def of_slide(finger: Finger[Patches], scene: Scene, state: EquilibriumState) -> Derivatives:
+def slide_derivatives(finger: Finger[Patches], scene: Scene, state: EquilibriumState) -> Derivatives:
     """Return the derivatives at a settled slide, driven by depth or by force.
 
     Raises ValueError where points stick, since such a state depends on the way to it, and where it has no tangent.
     """
-    skin = of_skin(finger.newton, state)
-    along, up = finger.newton.follows(skin)
-    ending = slope(finger.ending, finger.displacement(state), finger.body.following(skin))[:, 0]
-    rows = np.array([*ending, up, drag_along(scene) * along, [0.0, 0.0, 1.0]]) + 0.0  # never -0
+    skin = skin_derivatives(finger.newton, state)
+    along, up = finger.newton.force_changes(skin)
+    ending = response_derivatives(finger.ending, finger.displacement(state), finger.body.recover_increments(skin))[:, 0]
+    rows = np.array([*ending, up, drag_sign(scene) * along, [0.0, 0.0, 1.0]]) + 0.0  # never -0
     if scene.normal_force is None:
-        return _derivatives([By(mu, tau, depth, None) for mu, tau, depth in rows.tolist()])
+        return _derivatives([Gradient(mu, tau, depth, None) for mu, tau, depth in rows.tolist()])
     rows[:, 2] /= up[2]  # the depth changes so that the force stays
     rows[:, :2] -= rows[:, 2:] * up[:2]
-    derivatives = _derivatives([By(mu, tau, None, force) for mu, tau, force in rows.tolist()])
-    return replace(derivatives, normal=By(0.0, 0.0, None, 1.0))
+    derivatives = _derivatives([Gradient(mu, tau, None, force) for mu, tau, force in rows.tolist()])
+    return replace(derivatives, normal=Gradient(0.0, 0.0, None, 1.0))
 
 
-def _derivatives(rows: Sequence[By]) -> Derivatives:
+def _derivatives(rows: Sequence[Gradient]) -> Derivatives:
     """Return the derivatives of every quantity, both forces and the indentation by their names."""
     by_name = dict(zip(NAMES, rows, strict=False))
     return Derivatives(by_name[SED.name], *rows[len(NAMES) :], responses=by_name)
 
 
-def of_skin(newton: Newton, state: EquilibriumState) -> Array:
+def skin_derivatives(newton: Newton, state: EquilibriumState) -> Array:
     """Return the derivatives of a slide's skin (2 k, 3) by mu, tau_max and depth, by Newton's linearised contact.
 
     Raises ValueError for a state that is no slide, and where it has no tangent, at a limit.
@@ -86,7 +86,7 @@ def of_skin(newton: Newton, state: EquilibriumState) -> Array:
         raise ValueError("a state with sticking points depends on the way to it, which its tangent does not know")
     if not newton.linearise(state, load, newton.skin_x):
         raise ValueError("the state has no tangent")
-    x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
+    x = np.ascontiguousarray(state.skin_positions(newton.condensed)[:, 0])
     position = SkinPosition(x, np.zeros(size), x)  # on the surface, and nowhere else than where it sticks
     system = newton.system
     bounded_length(x, newton.skin, system.length)
@@ -105,7 +105,7 @@ def of_skin(newton: Newton, state: EquilibriumState) -> Array:
     return out
 
 
-def by_stiffness(finger: LinearFinger, state: EquilibriumState) -> Array:
+def stiffness_derivatives(finger: LinearFinger, state: EquilibriumState) -> Array:
     """Return the derivatives d log N / d log E (r,) of a frictionless press's normal force by each tissue's stiffness.
 
     Regions stand in the order of the mesh; a rigid bone has 0. With u the displacements, w their derivative by the
@@ -115,13 +115,13 @@ def by_stiffness(finger: LinearFinger, state: EquilibriumState) -> Array:
     if state.load.mu != 0.0:
         raise ValueError("with friction the normal force is no derivative of an energy")
     mesh = finger.geometry.mesh
-    by_depth = finger.body.following(of_skin(finger.newton, state)[:, _DEPTH, None])[:, :, 0]
+    by_depth = finger.body.recover_increments(skin_derivatives(finger.newton, state)[:, _DEPTH, None])[:, :, 0]
     forces = finger.body.elastic.forces(mesh.local(finger.displacement(state)))
     work = np.sum(mesh.local(by_depth) * forces, axis=(1, 2))
     return np.bincount(mesh.region, work, minlength=len(TISSUES)) / float(state.normal.sum())
 
 
-def slope(endings: Patches, displacement: Array, steps: Array) -> Array:
+def response_derivatives(endings: Patches, displacement: Array, steps: Array) -> Array:
     """Return the derivatives of endings' responses (q, r, c) at a `displacement` (nodes, 2) by `steps` (nodes, 2, c).
 
     By complex steps (Squire and Trapp 1998, SIAM Rev. 40, 110), exact to round-off.
@@ -130,13 +130,13 @@ def slope(endings: Patches, displacement: Array, steps: Array) -> Array:
     return endings.responses(perturbed).imag / IMAGINARY
 
 
-def drag_along(scene: Scene) -> int:
+def drag_sign(scene: Scene) -> int:
     """Return the sign along +x of the drag that opposes the slide of a scene."""
     return -(scene.loading.direction or 1)
 
 
-GOOD = 1e-9  # tolerance of displacements [-], far below the effect of any measurable difference of friction
-_NUMBERS = {name: state for state, name in STATE_NAMES.items()}
+_TOLERANCE = 1e-9  # tolerance of displacements [-], far below the effect of any measurable difference of friction
+_STATE_NUMBERS = {name: state for state, name in STATE_NAMES.items()}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,7 +149,7 @@ class Nearby:
 
     def derivatives(self) -> Derivatives:
         """Return the derivatives of the slide from the tangent at convergence."""
-        return of_slide(self.finger, self.scene, self.state)
+        return slide_derivatives(self.finger, self.scene, self.state)
 
     def seds(self, scenes: Sequence[Scene]) -> Array:
         """Return the SED (n, 2) [MPa] of scenes, as `responses` does."""
@@ -179,9 +179,9 @@ class Nearby:
         newton, state = self.finger.newton, self.state
         load = state.load._replace(mu=float(scene.friction.mu), tau=scene.friction.cap)
         if scene.normal_force is None:
-            return solve_full_slip(newton, load._replace(depth=scene.loading.depth), state, GOOD)
+            return solve_full_slip(newton, load._replace(depth=scene.loading.depth), state, _TOLERANCE)
         force = ForceLoad(scene.normal_force, None)
-        return solve_under_forces(newton, replace(state, load=load), force, Termination(GOOD))
+        return solve_under_forces(newton, replace(state, load=load), force, Termination(_TOLERANCE))
 
     def _on_branch(self, near: EquilibriumState) -> bool:
         """Return whether a state at finite strain lies on the branch of this one, as far as this mesh resolves."""
@@ -211,7 +211,7 @@ def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
             if isinstance(finger, FiniteFinger):
                 yield Nearby(scene, _recover_slide(finger, prediction), finger)
             elif isinstance(finger, LinearFinger):
-                yield Nearby(scene, _small_slide(finger, scene, states(prediction.skin)), finger)
+                yield Nearby(scene, _small_slide(finger, scene, contact_states(prediction.skin)), finger)
         except NotConverged:
             yield None
 
@@ -225,13 +225,13 @@ def stiffness_shares(predictions: Sequence[Prediction]) -> Array:
     for slide in nearby(predictions):
         if slide is None or not isinstance(slide.finger, LinearFinger):
             raise ValueError("no press at small strain that slides without friction")
-        prediction.append(by_stiffness(slide.finger, slide.state))
+        prediction.append(stiffness_derivatives(slide.finger, slide.state))
     return np.array(prediction)
 
 
-def states(skin: Skin) -> NDArray[np.int64]:
+def contact_states(skin: Skin) -> NDArray[np.int64]:
     """Return the contact states (k,) of sliding skin, with slip in place of stick."""
-    return np.array([SLIP if state == "stick" else _NUMBERS[state] for state in skin.state])
+    return np.array([SLIP if state == "stick" else _STATE_NUMBERS[state] for state in skin.state])
 
 
 def _small_slide(finger: LinearFinger, scene: Scene, guess: NDArray[np.integer]) -> EquilibriumState:
@@ -245,9 +245,7 @@ def _recover_slide(finger: FiniteFinger, prediction: Prediction) -> EquilibriumS
     length = np.empty(len(skin.x))
     tributary(skin.x, finger.body.middle, length)
     load = LoadState(prediction.indentation, float(scene.friction.mu), scene.friction.cap, sense)
-    state = states(skin).astype(np.int32)
+    state = contact_states(skin).astype(np.int32)
     reaction = np.stack([skin.traction, skin.pressure], axis=1) * length[:, None]
     modes, senses = finger.body.pressure(prediction.displacement), np.full(len(state), sense, np.int32)
-    return finger.newton.settle(
-        EquilibriumState(prediction.displacement, modes, state, senses, reaction, load, 0), load
-    )
+    return finger.newton.solve(EquilibriumState(prediction.displacement, modes, state, senses, reaction, load, 0), load)

@@ -24,7 +24,7 @@ from solver.quantities import NAMES
 from solver.response.answer import history
 from solver.scene import Scene
 
-ALL = 1.0 - 1e-9  # part of the touching nodes that slips when all do [-]
+FULL_SLIP = 1.0 - 1e-9  # part of the touching nodes that slips when all do [-]
 
 
 class Rates(NamedTuple):
@@ -53,7 +53,7 @@ def instants(history: History) -> tuple[int, int, int]:
     # A press without drag, before it is dragged, lets the bone move along the surface too.
     moving = np.flatnonzero((history.time > PRESSING_TIME) & (np.abs(history.bone_x) > 0.0))
     first = int(moving[0]) if len(moving) else count
-    slip = np.flatnonzero((history.slipping >= ALL) & (np.arange(count) >= first))
+    slip = np.flatnonzero((history.slipping >= FULL_SLIP) & (np.arange(count) >= first))
     return first, int(slip[0]) + 1 if len(slip) else count, count
 
 
@@ -116,7 +116,7 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
     finer = course_numbers(course)
     edges = 0.0 * usual.value
     if not scene.materials.relax:
-        edges += [_of_edges(scene, nested, state) for state in states]
+        edges += [_sum_of_edge_changes(scene, nested, state) for state in states]
     times = np.concatenate([[0.0], course.time])[[0, *ends]]
     of_quantities = np.concatenate([np.zeros((1, len(NAMES))), edges[:, len(COURSE_NUMBERS) :]])
     with np.errstate(divide="ignore", invalid="ignore"):  # of a part that is not there
@@ -132,7 +132,7 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
     return CourseNumbers(error("value", edges), error("rate", rate_edges))
 
 
-def _of_edges(scene: Scene, nested: Finger[Any], state: EquilibriumState) -> Array:
+def _sum_of_edge_changes(scene: Scene, nested: Finger[Any], state: EquilibriumState) -> Array:
     """Return the changes of the numbers at an instant (5 + q,), summed over edges of contact that move by a node."""
     by_force = scene.normal_force is not None
     forces = ForceLoad(float(state.normal.sum()), None, state.load.travel) if by_force else None

@@ -17,7 +17,7 @@ from solver.body.linear import Elastic, LinearPatches
 from solver.body.receptor import endings
 from solver.continuation.finite_states import rough_state
 from solver.continuation.limit_point import is_sound
-from solver.continuation.small_states import WIDE, expected_depth, nearest_state, proven_state
+from solver.continuation.small_states import WIDE_MARGIN, expected_depth, nearest_state, proven_state
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger, finite_laws, settled_moduli
 from solver.equilibrium.load_path import end
@@ -121,7 +121,7 @@ def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> 
     for _, numbers in groupby(order, lambda n: scenes[n].loading_group if finite else None):
         group = list(numbers)
         depth = max(expected_depth(scenes[number]) for number in group)
-        sizing = Sizing(FIRST_FINENESS, depth, margin=WIDER) if finite else Sizing(_FINENESS, depth, margin=WIDE)
+        sizing = Sizing(FIRST_FINENESS, depth, margin=WIDER) if finite else Sizing(_FINENESS, depth, margin=WIDE_MARGIN)
         finger = KINDS[scenes[0].solve.kinematics].of(scenes[group[0]], sizing)
         states: dict[int, EquilibriumState] = {}
         near: EquilibriumState | None = None

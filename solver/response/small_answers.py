@@ -16,8 +16,8 @@ from solver.accuracy.convergence_order import order_of
 from solver.accuracy.error_estimate import NO_NESTED_STATE, Steps, edge_changes, nested_state
 from solver.arrays import Array
 from solver.continuation.small_states import (
-    WIDE,
-    gives_way,
+    WIDE_MARGIN,
+    is_unstable_under_force,
     nearest_state,
     proven_state,
     refuse_beyond_tissue,
@@ -37,7 +37,7 @@ from solver.scene import Scene
 
 SMALL_IMBALANCE = 1e-10  # relative residual of the forces from which a state is refined [-]
 
-YIELDS = (
+UNSTABLE = (
     "The drag lifts the bone: pressed a little harder, the finger would slide at a smaller depth. Under a weight, that "
     "follows it down, this slide would not last; held at this depth, the finger slides under less force."
 )
@@ -67,8 +67,8 @@ class SmallMeshing(Meshing):
         """Do as `Meshing` says; where contact leaves the skin considered, solve all on a mesh with more of it."""
         self._fingers = {sizing: entry for sizing, entry in self._fingers.items() if sizing.fineness == fineness}
         deep = max(self.deepest.values())
-        most = max(deep, min(WIDE * deep, scenes[0].finger.pulp_thickness()))  # for drags that lay much on
-        narrow, wide = (Sizing(fineness, depth, margin=WIDE) for depth in (deep, most))
+        most = max(deep, min(WIDE_MARGIN * deep, scenes[0].finger.pulp_thickness()))  # for drags that lay much on
+        narrow, wide = (Sizing(fineness, depth, margin=WIDE_MARGIN) for depth in (deep, most))
         try:
             results = self._on_mesh(scenes, narrow, watch, last=False)
             return self._on_mesh(scenes, wide, watch, last=True) if len(results) < len(scenes) else results
@@ -125,11 +125,11 @@ class SmallMeshing(Meshing):
         steady = proven_state(scene, finger)
         try:
             steps = choose_steps(scene, finger, settled=steady)
-            times = steps_of_press(scene, finger) if steps is None else steps.times
+            step_factor = steps_of_press(scene, finger) if steps is None else steps.factor
         except SolveFailure:
-            steps, times = Steps(1, np.zeros(COUNT), np.zeros(COUNT)), 1  # there will be no estimate either
-        if times > 1 and steps is not None:
-            steady = proven_state(scene, finger, times)
+            steps, step_factor = Steps(1, np.zeros(COUNT), np.zeros(COUNT)), 1  # there will be no estimate either
+        if step_factor > 1 and steps is not None:
+            steady = proven_state(scene, finger, step_factor)
         path, state, relaxing = None, steady, history and scene.materials.relax
         if history:
             progress = self.progress
@@ -137,7 +137,7 @@ class SmallMeshing(Meshing):
             def report(_: str, part: float) -> None:
                 report_part(progress, (position + part) / count)
 
-            path = march(scene, finger, times, relaxing=relaxing, report=report)
+            path = march(scene, finger, step_factor, relaxing=relaxing, report=report)
             state = path.last
             if relaxing:
                 state = replace(state, u=finger.body.condensed.displacement_under(state.reaction))
@@ -149,7 +149,8 @@ class SmallMeshing(Meshing):
         (state, displacement), checks = _remove_round_off(scene, finger, (state, displacement), always=direct_solve)
         solution = SceneSolution(scene, state, displacement, checks, steps, path)
         complete_audits(scene, finger, solution, finger.newton, lambda: finger.sed_ending(finger.displacement(steady)))
-        warnings = tuple(filter(None, [audits.inside_out(checks), YIELDS if gives_way(scene, finger, state) else ""]))
+        unstable = UNSTABLE if is_unstable_under_force(scene, finger, state) else ""
+        warnings = tuple(filter(None, [audits.inside_out_warning(checks), unstable]))
         return replace(solution, warnings=warnings, wall_s=perf_counter() - start + finger.solve_s / count)
 
     def _predict(self, solutions: list[SceneSolution], finger: LinearFinger, sizing: Sizing) -> list[Prediction]:

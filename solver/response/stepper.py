@@ -23,8 +23,8 @@ from solver.failures import ContactLost
 from solver.mesh.mesher import Sizing
 from solver.scene import Scene
 
-SLIDING = 0.995  # fraction of the friction limit beyond which the tangential force means sliding
-_LIGHT = 1e-7  # normal force below which there is no contact [N/mm]
+SLIDING_SHARE = 0.995  # fraction of the friction limit beyond which the tangential force means sliding
+_MIN_FORCE = 1e-7  # normal force below which there is no contact [N/mm]
 
 
 class Stepper(ABC):
@@ -65,12 +65,12 @@ class Stepper(ABC):
         normal, tangential = float(normal), float(tangential)  # the kernels take floats
         if not isfinite(normal + tangential):
             return float("nan")
-        if normal < _LIGHT:
-            self.forget()
+        if normal < _MIN_FORCE:
+            self.reset()
             return 0.0
         return self.advance(normal, min(max(tangential, -self.mu * normal), self.mu * normal))
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Return to the undeformed finger."""
         self.state = EquilibriumState.undeformed(self.newton.condensed)
 
@@ -88,7 +88,7 @@ class Stepper(ABC):
         displacement = self.finger.displacement(self.state)
         return self.finger.geometry.mesh.nodes[skin] + displacement[skin] - [0.0, self.depth]
 
-    def under_friction(self, *, slides: bool, sense: int) -> EquilibriumState:
+    def with_friction(self, *, slides: bool, sense: int) -> EquilibriumState:
         """Return the last state under the present friction; where it `slides`, its contact slips towards `sense`."""
         last, load = self.state, self.state.load
         state = np.where(last.state == STICK, SLIP, last.state).astype(np.int32) if slides else last.state.copy()
@@ -97,7 +97,7 @@ class Stepper(ABC):
         return replace(last, state=state, sense=senses, load=load)
 
 
-CHANGES = 60  # systems for a reading, at most: 1 to 3 are usual
+_MAX_SYSTEMS = 60  # systems for a reading, at most: 1 to 3 are usual
 
 
 class SmallStepper(Stepper):
@@ -110,25 +110,25 @@ class SmallStepper(Stepper):
 
         Backward Euler: a point sticks where it was, or slips from there against its friction force.
         """
-        slides = abs(tangential) >= SLIDING * self._most(normal)
-        start = self.under_friction(slides=slides, sense=1 if tangential > 0.0 else -1)
+        slides = abs(tangential) >= SLIDING_SHARE * self._friction_limit(normal)
+        start = self.with_friction(slides=slides, sense=1 if tangential > 0.0 else -1)
         if not start.state.any():
             start = lower_onto_surface(self.newton.condensed, start)
         forces = ForceLoad(normal, None, start.load.travel) if slides else ForceLoad(normal, tangential)
         x = start.u[:, 0] + self.newton.skin_x
         try:
-            state = self.newton.solve_linear(start, start.load, x, forces, CHANGES)
+            state = self.newton.solve_linear(start, start.load, x, forces, _MAX_SYSTEMS)
         except ContactLost:
-            self.forget()
+            self.reset()
             return float("nan")
         if state.reaches_end:
-            self.forget()
+            self.reset()
             return float("nan")
         self.state = state
         gradient = self.finger.ending_by_skin @ state.u.ravel()
         return float(gradient @ gradient)
 
-    def _most(self, normal: float) -> float:
+    def _friction_limit(self, normal: float) -> float:
         """Return the friction limit [N/mm] for the last distribution of pressure."""
         if self.tau == np.inf:
             return self.mu * normal
@@ -141,24 +141,26 @@ class SmallStepper(Stepper):
 
 
 @dataclass(frozen=True, slots=True)
-class FollowControl:
+class StepperControl:
     """Iterations for a reading at finite strain, and criteria for a valid state and for a lost one."""
 
-    force_error: float = 0.02  # largest error of the forces of a valid state, by the normal force
-    relief: float = 0.7  # ratio of the normal force to that of the last failure at which a lost state is tried again
-    stairs: int = 12  # load steps from the undeformed finger to the forces of a reading
-    leading: int = 3  # iterations for each of these
-    arriving: int = 8  # iterations for the last of these, and after an invalid state, at most
-    near: float = 1e-3  # displacement in an iteration that ends those, by the length scale of the body
-    least_stretch: float = 0.65  # smallest stretch of valid skin: it folds at 0.544, later on a coarse mesh
-    largest_kink: float = 0.3  # largest kink of valid skin: a coarse mesh has this where skin folds
-    far: float = 0.01  # displacement in an iteration after which another follows, likewise
-    further: int = 3  # iterations then, at most
-    stiff: float = 1e3  # ratio of bulk to shear stiffness from which a kept tangent diverges (nu 0.4995)
-    furthest: float = 0.4  # displacement in an iteration beyond which the state is lost, likewise
+    max_force_error: float = 0.02  # of a valid state, by the normal force
+    retry_ratio: float = (
+        0.7  # ratio of the normal force to that of the last failure at which a lost state is tried again
+    )
+    restart_steps: int = 12  # load steps from the undeformed finger to the forces of a reading
+    restart_iterations: int = 3  # iterations for each of these
+    max_catch_up_iterations: int = 8  # for the last of these, and after an invalid state
+    catch_up_step: float = 1e-3  # displacement in an iteration that ends those, by the length scale of the body
+    min_stretch: float = 0.65  # of valid skin: it folds at 0.544, later on a coarse mesh
+    max_kink: float = 0.3  # of valid skin: a coarse mesh has this where skin folds
+    large_step: float = 0.01  # displacement in an iteration after which another follows, likewise
+    max_iterations: int = 3  # then
+    max_stiffness_ratio: float = 1e3  # ratio of bulk to shear stiffness from which a kept tangent diverges (nu 0.4995)
+    divergence: float = 0.4  # displacement in an iteration beyond which the state is lost, likewise
 
 
-_CONTROL = FollowControl()
+_CONTROL = StepperControl()
 
 
 class FiniteStepper(Stepper):
@@ -170,14 +172,14 @@ class FiniteStepper(Stepper):
         """Start undeformed, as `Stepper`."""
         super().__init__(finger, mu, tau)
         self._lost_at: float | None = None  # normal force [N/mm]
-        self._hopeless = False  # whether the load steps from the undeformed finger failed
-        self._behind = False  # whether the forces of the last state differ too much
+        self._restart_failed = False  # whether the load steps from the undeformed finger failed
+        self._forces_missed = False  # whether the forces of the last state differ too much
         self._stiffness = 0.0  # derivative of the normal force by depth in the last iteration [N/mm per mm]
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Return to the undeformed finger."""
-        super().forget()
-        self._lost_at, self._hopeless, self._behind = None, False, False
+        super().reset()
+        self._lost_at, self._restart_failed, self._forces_missed = None, False, False
 
     def advance(self, normal: float, tangential: float) -> float:
         """Do as `Stepper` says.
@@ -188,19 +190,19 @@ class FiniteStepper(Stepper):
         """
         if self._lost_at is None:
             return self._follow(normal, tangential)
-        if self._hopeless and normal >= _CONTROL.relief * self._lost_at:
+        if self._restart_failed and normal >= _CONTROL.retry_ratio * self._lost_at:
             return float("nan")
-        return self._lead(normal, tangential)
+        return self._restart(normal, tangential)
 
-    def _lead(self, normal: float, tangential: float) -> float:
+    def _restart(self, normal: float, tangential: float) -> float:
         """Return the result of `step` by load steps from the undeformed finger."""
-        self.forget()
+        self.reset()
         sed = float("nan")
-        for part in np.linspace(1.0 / _CONTROL.stairs, 1.0, _CONTROL.stairs).tolist():
-            self._behind = part == 1.0
-            sed = self._follow(part * normal, part * tangential, _CONTROL.leading)
+        for part in np.linspace(1.0 / _CONTROL.restart_steps, 1.0, _CONTROL.restart_steps).tolist():
+            self._forces_missed = part == 1.0
+            sed = self._follow(part * normal, part * tangential, _CONTROL.restart_iterations)
             if self.lost:
-                self._lost_at, self._hopeless = normal, True
+                self._lost_at, self._restart_failed = normal, True
                 break
         return sed
 
@@ -212,57 +214,59 @@ class FiniteStepper(Stepper):
     def _follow(self, normal: float, tangential: float, iterations: int = 1) -> float:
         """Return the result of `step` by iterations from the last state."""
         newton = self.newton
-        state = self._ready(normal, tangential)
+        state = self._starting_state(normal, tangential)
         anchor = state.anchor(newton.condensed)
-        forces, goes_far = ForceLoad(normal, tangential), self._goes_far(normal)
+        forces, large_step = ForceLoad(normal, tangential), self._expects_large_step(normal)
         scale = newton.length_scale
-        far, turns = (_CONTROL.near, _CONTROL.arriving) if self._behind else (_CONTROL.far, _CONTROL.further)
+        far, turns = _CONTROL.large_step, _CONTROL.max_iterations
+        if self._forces_missed:
+            far, turns = _CONTROL.catch_up_step, _CONTROL.max_catch_up_iterations
         for number in range(1, max(iterations, turns) + 1):
-            reuse = goes_far and number == 1
+            reuse = large_step and number == 1
             regular = newton.linearise(state, state.load, anchor(state.load), 0, forces, reuse=reuse)
             correction = newton.correct(state, anchor) if regular else None
-            if reuse and (correction is None or correction[1] > _CONTROL.furthest * scale):
+            if reuse and (correction is None or correction[1] > _CONTROL.divergence * scale):
                 continue
-            if correction is None or correction[1] > _CONTROL.furthest * scale or correction[0].reaches_end:
-                return self._lose(normal)
+            if correction is None or correction[1] > _CONTROL.divergence * scale or correction[0].reaches_end:
+                return self._lose_state(normal)
             state = correction[0]
             if number >= iterations and not reuse and correction[1] < far * scale:
                 break
-        self._stiffness = float(newton.follows(newton.steps)[1, BY_DEPTH])
+        self._stiffness = float(newton.force_changes(newton.steps)[1, BY_DEPTH])
         compression = self.finger.skin_compression(state)
-        if compression.least < _CONTROL.least_stretch:
-            return self._lose(normal)
+        if compression.least_chord < _CONTROL.min_stretch:
+            return self._lose_state(normal)
         self.state = state
         x, y = state.force
-        behind = max(abs(y - normal), abs(x - tangential) if (state.state == STICK).any() else 0.0)
-        self._behind = behind > _CONTROL.force_error * normal
-        if self._behind:
+        miss = max(abs(y - normal), abs(x - tangential) if (state.state == STICK).any() else 0.0)
+        self._forces_missed = miss > _CONTROL.max_force_error * normal
+        if self._forces_missed:
             return float("nan")
-        if compression.lowest < _CONTROL.least_stretch or compression.kink > _CONTROL.largest_kink:
-            return self._lose(normal)
+        if compression.least_stretch < _CONTROL.min_stretch or compression.kink > _CONTROL.max_kink:
+            return self._lose_state(normal)
         return self.finger.sed_ending(state.u)
 
-    def _goes_far(self, normal: float) -> bool:
+    def _expects_large_step(self, normal: float) -> bool:
         """Return whether a large displacement is due, so that the first iteration keeps the last tangent.
 
         Such an iteration takes a third of the time, and a new tangent is of more use at its end.
         """
         missing = abs(normal - float(self.state.force[1]))
-        far = _CONTROL.far * self.newton.length_scale
-        goes_far = self.state.touching.any() and 0.0 < far * self._stiffness < missing
-        return bool(goes_far) and self.newton.bulk < _CONTROL.stiff
+        far = _CONTROL.large_step * self.newton.length_scale
+        large_step = self.state.touching.any() and 0.0 < far * self._stiffness < missing
+        return bool(large_step) and self.newton.bulk < _CONTROL.max_stiffness_ratio
 
-    def _lose(self, normal: float) -> float:
-        self.forget()
+    def _lose_state(self, normal: float) -> float:
+        self.reset()
         self._lost_at = normal
         return float("nan")
 
-    def _ready(self, normal: float, tangential: float) -> EquilibriumState:
+    def _starting_state(self, normal: float, tangential: float) -> EquilibriumState:
         """Return the last state with contact states that can carry the forces: slip everywhere, or some stick."""
-        slides = abs(tangential) > SLIDING * self.mu * normal
-        state = self.under_friction(slides=slides, sense=1 if tangential > 0.0 else -1)
+        slides = abs(tangential) > SLIDING_SHARE * self.mu * normal
+        state = self.with_friction(slides=slides, sense=1 if tangential > 0.0 else -1)
         if not state.touching.any():
-            state.state[int(np.argmin(state.place(self.newton.condensed)[:, 1]))] = SLIP if slides else STICK
+            state.state[int(np.argmin(state.skin_positions(self.newton.condensed)[:, 1]))] = SLIP if slides else STICK
         elif not slides and not (state.state == STICK).any():
             state.state[state.state != OPEN] = STICK
         return state
@@ -275,7 +279,7 @@ MARGIN = {
 }  # by the indentation: height of undeformed skin up to which contact is considered
 # A nine-node element as four quadrilaterals, and the local coordinates of their midpoints.
 QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
-MIDDLES = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+MIDPOINTS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 
 
 class LivePicture:
@@ -286,7 +290,7 @@ class LivePicture:
         mesh, count = finger.geometry.mesh, 4 * len(finger.geometry.mesh.elements)
         self.faces, self.rest = mesh.elements[:, QUARTERS].reshape(-1, 4), mesh.nodes
         each = np.arange(count)
-        probes = Probes.at(mesh, finger.body.centre, each // 4, MIDDLES[each % 4])
+        probes = Probes.at(mesh, finger.body.centre, each // 4, MIDPOINTS[each % 4])
         middles = Endings(probes, np.ones(count), each, count, np.tile([1.0, 0.0], (count, 1)))
         self._finger, self._middles = finger, finger.patches(middles)
 
@@ -313,5 +317,5 @@ def stepper(scene: Scene) -> Stepper:
     else:
         follower = SmallStepper(LinearFinger.of(scene, sizing), mu, tau)
     follower.step(1e-3, 0.0)  # compiles or loads the kernels
-    follower.forget()
+    follower.reset()
     return follower

@@ -14,7 +14,7 @@ Law = Literal["hooke", "neo-hookean", "ogden"]
 TISSUES = ("epidermis", "dermis", "fat", "bone")  # in the order of the mesh's regions
 STIFFENING = 2.0, 14.0  # exponents of Ogden's law, from the neo-Hookean one; steeper laws gave inconsistent results
 SHALLOW = 1e-6  # least indentation [mm]: below, round-off is as large as the response
-FEEBLE = 1e-12  # least nonzero friction [-, MPa]: below, round-off is as large as the drag
+MIN_FORCE = 1e-12  # least nonzero friction [-, MPa]: below, round-off is as large as the drag
 LAWS_OF = {"small": ("hooke",), "finite": ("neo-hookean", "ogden")}  # of each kinematics
 
 
@@ -255,9 +255,9 @@ class Friction(Table):
         """Check ranges."""
         Table.__post_init__(self)
         if self.mu != 0.0:
-            _within("friction.mu", self.mu, FEEBLE, 1000.0, zero=True)
+            _within("friction.mu", self.mu, MIN_FORCE, 1000.0, zero=True)
         if self.tau_max is not None and self.tau_max != 0.0:
-            _within("friction.tau_max", self.tau_max, FEEBLE, 1e12, "MPa", zero=True)
+            _within("friction.tau_max", self.tau_max, MIN_FORCE, 1e12, "MPa", zero=True)
 
     @property
     def cap(self) -> float:

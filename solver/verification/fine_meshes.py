@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver.arrays import Array
-from solver.continuation.small_states import WIDE, expected_depth, settled_state
+from solver.continuation.small_states import WIDE_MARGIN, expected_depth, settled_state
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import end
 from solver.failures import NotConverged, SolveFailure
@@ -67,33 +67,36 @@ def depends_on_way(scene: Scene) -> bool:
     return scene.loading.direction == 0 or scene.loading.dragged
 
 
-def numbers_on_mesh(scenes: Sequence[Scene], fineness: float, shift: bool, times: int = 1) -> Array:
-    """Return SED [MPa], normal force and drag [N/mm] (n, 3) of surfaces on one mesh, in `times` the usual steps."""
+def numbers_on_mesh(scenes: Sequence[Scene], fineness: float, shift: bool, step_factor: int = 1) -> Array:
+    """Return SED [MPa], normal force and drag [N/mm] (n, 3) of surfaces on one mesh.
+
+    Load paths take `step_factor` times the usual steps.
+    """
     on_mesh = _finite if scenes[0].solve.kinematics == "finite" else _small
-    return np.array(list(on_mesh(scenes, fineness, shift, times)))
+    return np.array(list(on_mesh(scenes, fineness, shift, step_factor)))
 
 
-def _small(scenes: Sequence[Scene], fineness: float, shift: bool, times: int) -> Iterator[Array]:
+def _small(scenes: Sequence[Scene], fineness: float, shift: bool, step_factor: int) -> Iterator[Array]:
     depth = max(expected_depth(scene) for scene in scenes)
-    finger = LinearFinger.of(scenes[0], Sizing(fineness, depth, shift, WIDE))
+    finger = LinearFinger.of(scenes[0], Sizing(fineness, depth, shift, WIDE_MARGIN))
     for scene in scenes:
         stepwise = scene.viscoelastic and depends_on_way(scene)
-        state = (end if stepwise else settled_state)(scene, finger, times)
+        state = (end if stepwise else settled_state)(scene, finger, step_factor)
         if finger.reaches_out(state, finger.displacement(state), state.load.depth):
             raise NotConverged("Contact reaches out of the skin that is looked at.")
         yield np.abs(finger.numbers([state])[0])
 
 
-def _finite(scenes: Sequence[Scene], fineness: float, shift: bool, times: int) -> Iterator[Array]:
+def _finite(scenes: Sequence[Scene], fineness: float, shift: bool, step_factor: int) -> Iterator[Array]:
     meshes, depth = Meshes(), max(expected_depth(scene) for scene in scenes)
     for scene in scenes:
         low = coarse_solution(scene, depth, FIRST_FINENESS, meshes)
         sizing = replace(low.sizing, fineness=fineness, shift=shift)
         if scene.viscoelastic and depends_on_way(scene):
             finger = meshes.finger(scene, replace(sizing, margin=WIDER))
-            yield np.abs(finger.numbers([end(scene, finger, times)])[0])
+            yield np.abs(finger.numbers([end(scene, finger, step_factor)])[0])
             continue
-        top = solution_on(scene, sizing, low, meshes, times)
+        top = solution_on(scene, sizing, low, meshes, step_factor)
         if top.state.reaches_end:
-            top = solution_on(scene, replace(sizing, margin=WIDER), low, meshes, times)
+            top = solution_on(scene, replace(sizing, margin=WIDER), low, meshes, step_factor)
         yield np.abs(top.finger.numbers([top.state])[0])

@@ -75,7 +75,7 @@ def timed_passes(follows: Stepper, readings: list[Reading], passes: int = PASSES
     spans = np.zeros((passes, len(readings)))
     seds = np.zeros(len(readings))
     for number in range(passes):
-        follows.forget()
+        follows.reset()
         for n, (normal, tangential, _) in enumerate(readings):
             start = clock()
             seds[n] = follows.step(normal, tangential)

@@ -48,7 +48,7 @@ def test_solve_tells_people_stresses_in_kilopascal_at_the_ending_along_the_row_a
 def test_a_tolerance_that_no_mesh_meets_gives_the_best_answer_its_interval_a_warning_and_exit_code_3(
     tmp_path, capsys, monkeypatch
 ):
-    monkeypatch.setattr(adaptivity, "MOST_UNKNOWNS", 2000)
+    monkeypatch.setattr(adaptivity, "MAX_UNKNOWNS", 2000)
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE + "[solve]\ntolerance = 0.0001\n")
     assert run(["solve", str(scene), "--json"]) == 3

@@ -13,7 +13,7 @@ from sessions.prediction.scenes import scene_along, settled_predictions, with_lo
 from sessions.prediction.uncertainty import with_alternatives, with_intervals
 from sessions.strokes.bootstrap import BootstrapSettings, friction_draws, stroke_intervals
 from simulators.bench import BenchSettings
-from solver.response.nearby import By
+from solver.response.nearby import Gradient
 
 # Of a levelled face and a calibration without cross-talk, so that the friction's interval is narrow.
 LEVEL = BootstrapSettings(tilt_error=(0.0, 0.0), cross_talk=0.0)
@@ -107,7 +107,7 @@ class FormulaSlide:
         self.formula, self.by_mu, self.row = formula, by_mu, row
 
     def derivatives(self):
-        none = By(0.0, 0.0, 0.0, None)
+        none = Gradient(0.0, 0.0, 0.0, None)
         sed = none._replace(mu=self.by_mu)
         return SimpleNamespace(sed=sed, normal=none, tangential=none, indentation=none)
 

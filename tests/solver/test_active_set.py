@@ -11,7 +11,7 @@ from solver.body.linear import LinearBody
 from solver.constitutive import Hooke
 from solver.contact import ForceLoad, FrictionLaw, LoadState
 from solver.equilibrium import EquilibriumState, Newton, lower_onto_surface
-from solver.equilibrium.load_path import Aim, LoadPath
+from solver.equilibrium.load_path import LoadPath, LoadPoint
 from solver.equilibrium.load_stepping import slide_from_guess, solve_full_slip, solve_under_forces
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.oracle.active_set import (
@@ -70,7 +70,7 @@ def test_a_course_of_stick_slip_and_turning_round_is_the_plain_one(newton, surfa
     state, states = EquilibriumState.undeformed(newton.condensed), set()
     for depth, travel in STEPS:
         contact = contact_solver.step(contact, depth, travel)
-        state = newton.settle(state, LoadState(depth, law.mu, law.tau_max, travel=-travel))
+        state = newton.solve(state, LoadState(depth, law.mu, law.tau_max, travel=-travel))
         assert_same_contact(state, contact)
         states |= set(state.state.tolist())
     assert frictionless(law) or (states >= {STICK, SLIP} and (SHEAR_LIMITED in states) == np.isfinite(law.tau_max))
@@ -97,7 +97,7 @@ def test_a_way_under_given_forces_ends_with_them(newton):
     loading = Loading(normal_force=0.1, tangential_force=0.02)
     path = LoadPath(newton, LoadState(0.0, 0.5, 0.01), loading)
     for n in range(1, 51):
-        path.go(Aim(0.04 * n, 0.1 * min(n / 25, 1.0), -0.02 * max(n / 25 - 1.0, 0.0)))
+        path.advance_to(LoadPoint(0.04 * n, 0.1 * min(n / 25, 1.0), -0.02 * max(n / 25 - 1.0, 0.0)))
     last = path.last
     np.testing.assert_allclose(last.force, [-0.02, 0.1], rtol=1e-9)
     assert (last.state == STICK).any()

@@ -7,8 +7,8 @@ import pytest
 
 from solver import Friction, Loading, NoSteadyState, Scene, Solve, solve, solve_many
 from solver.accuracy import adaptivity
-from solver.accuracy.adaptivity import MOST_UNKNOWNS, NestedGrid, adjoint, refine_lines
-from solver.continuation.small_states import WIDE, settled_state
+from solver.accuracy.adaptivity import MAX_UNKNOWNS, NestedGrid, adjoint, refine_lines
+from solver.continuation.small_states import WIDE_MARGIN, settled_state
 from solver.equilibrium import Newton
 from solver.equilibrium.finger import LinearFinger
 from solver.mesh.mesher import Sizing
@@ -20,7 +20,7 @@ SLIDES = {
     "slip at a bound": Scene(friction=Friction(0.6, 0.01), loading=Loading(1.5, "-x")),
     "stick": Scene(friction=Friction(0.5), loading=Loading(1.5)),
 }
-COARSE = Sizing(4.0, 1.5, margin=WIDE)
+COARSE = Sizing(4.0, 1.5, margin=WIDE_MARGIN)
 
 
 def sed(finger, scene):
@@ -39,7 +39,7 @@ def test_the_adjoint_says_what_a_force_inside_the_finger_changes(scene):
         for along in (0, 1):
             load = np.zeros(mesh.nodes.shape)
             load[node, along] = step
-            body, recover = finger.body.under(load)
+            body, recover = finger.body.with_loads(load)
             newton = Newton(body)
             assert newton.linearise(state, state.load, newton.skin_x + state.u[:, 0])
             displaced = state.u + newton.steps[:, 0].reshape(-1, 2)
@@ -66,7 +66,7 @@ def test_four_columns_made_one_have_a_far_larger_part_of_the_error(place):
 
 def test_dividing_what_has_the_largest_part_changes_the_sed_most():
     scene = scenes()[4]
-    sizing = Sizing(4.0, 2.0, margin=WIDE)
+    sizing = Sizing(4.0, 2.0, margin=WIDE_MARGIN)
     finger = LinearFinger.of(scene, replace(sizing, halved=True))
     state = settled_state(scene, finger)
     parts = np.concatenate(NestedGrid.of(finger).parts(finger.displacement(state), state))
@@ -93,7 +93,7 @@ def test_refined_lines_contain_the_old_ones_and_no_more_than_a_mesh_may_have():
         assert set(mesh.lines.arcs) < set(lines.arcs)
         assert np.all(np.diff(lines.arcs) > 0.0)
         assert np.all(np.diff(lines.skin) < 0.0)
-        assert LinearFinger.of(SLIDES["slip"], replace(COARSE, fineness=lines)).body.mesh.dofs <= MOST_UNKNOWNS
+        assert LinearFinger.of(SLIDES["slip"], replace(COARSE, fineness=lines)).body.mesh.dofs <= MAX_UNKNOWNS
     assert len(few.arcs) < len(many.arcs)
     assert len(halves.arcs) == 2 * len(mesh.lines.arcs) - 1
 
@@ -106,7 +106,7 @@ def test_a_contact_narrower_than_its_smallest_elements_is_solved_on_one_mesh():
 
 
 def test_refinement_comes_to_an_end(monkeypatch):
-    monkeypatch.setattr(adaptivity, "MOST_UNKNOWNS", 4000)
+    monkeypatch.setattr(adaptivity, "MAX_UNKNOWNS", 4000)
     scene, dofs = scenes()[9], []
     strict_scene = replace(scene, solve=replace(scene.solve, tolerance=1e-4, evidence="quick"))
     prediction = solve(strict_scene, rough=lambda rough: dofs.append(rough.dofs))
@@ -121,7 +121,7 @@ def test_refinement_comes_to_an_end(monkeypatch):
 
 
 def test_a_surface_that_has_no_answer_does_not_keep_the_others_from_an_end(monkeypatch):
-    monkeypatch.setattr(adaptivity, "MOST_UNKNOWNS", 3000)
+    monkeypatch.setattr(adaptivity, "MAX_UNKNOWNS", 3000)
     settings = Solve("finite", contrast_tolerance=0.0005)
     surfaces = [Scene(friction=Friction(mu), loading=Loading(2.0, "+x"), solve=settings) for mu in (0.2, 0.25, 0.9)]
     rounds = []
@@ -137,8 +137,8 @@ def test_a_surface_that_has_no_answer_does_not_keep_the_others_from_an_end(monke
 def test_a_tolerance_is_met_with_few_unknowns():
     scene = scenes()[9]
     prediction = solve(replace(scene, solve=replace(scene.solve, tolerance=0.0005)))
-    even_finger = LinearFinger.of(scene, Sizing(8.0, 2.0, margin=WIDE))
-    fine_sed = sed(LinearFinger.of(scene, Sizing(26.0, 2.0, margin=WIDE)), scene)
+    even_finger = LinearFinger.of(scene, Sizing(8.0, 2.0, margin=WIDE_MARGIN))
+    fine_sed = sed(LinearFinger.of(scene, Sizing(26.0, 2.0, margin=WIDE_MARGIN)), scene)
     assert prediction.error_estimate <= 0.0005
     assert prediction.dofs < even_finger.body.mesh.dofs  # with elements half as large as the first mesh's
     assert abs(prediction.sed_ending / fine_sed - 1.0) < 0.0005

@@ -60,7 +60,7 @@ def test_at_every_step_nothing_lies_below_the_surface_pulls_or_drags_beyond_the_
     for instant in histories[case][1:]:
         contact = instant.state
         push = contact.normal.max()
-        assert contact.place(finger.body.condensed)[:, 1].min() - instant.depth > -1e-9 * instant.depth
+        assert contact.skin_positions(finger.body.condensed)[:, 1].min() - instant.depth > -1e-9 * instant.depth
         assert contact.normal.min() >= -1e-10 * push
         assert (np.abs(contact.tangential) - law.limit(contact.normal, length)).max() < 1e-10 * push
 

@@ -5,7 +5,7 @@ import pytest
 
 from solver import Finger, Receptor
 from solver.contact import LoadState
-from solver.equilibrium.finger import MeshTransfer, Places
+from solver.equilibrium.finger import GridPositions, MeshTransfer
 from solver.equilibrium.load_stepping import solve_full_slip
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.finite_examples import finger
@@ -14,7 +14,7 @@ LOAD = LoadState(1.0, 0.28, 0.008033, -1)
 
 
 def places(fineness):
-    return Places.of(
+    return GridPositions.of(
         finger_mesh(Finger(), Receptor(), Sizing(fineness, 2.0, margin=2.0)), finger(fineness)[0].condensed.body
     )
 

@@ -156,6 +156,6 @@ def test_a_tyre_that_cannot_slide_is_reported_lost():
 
 def test_before_first_touch_nothing_is_felt():
     body = cylinder(4.5, 0.4)
-    before = Newton(body.condensed).settle(EquilibriumState.undeformed(body.condensed), LoadState(-0.01, 0.3))
+    before = Newton(body.condensed).solve(EquilibriumState.undeformed(body.condensed), LoadState(-0.01, 0.3))
     assert not before.normal.any()
-    assert before.place(body.condensed)[:, 1].min() == pytest.approx(0.0, abs=1e-12)
+    assert before.skin_positions(body.condensed)[:, 1].min() == pytest.approx(0.0, abs=1e-12)

@@ -19,7 +19,7 @@ from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.load_stepping import solve_full_slip, solve_under_forces
 from solver.mesh.mesher import Sizing
 from solver.quantities import QUANTITIES
-from solver.response.nearby import of_skin, of_slide, slope
+from solver.response.nearby import response_derivatives, skin_derivatives, slide_derivatives
 from tests.solver.finite_examples import block
 
 NAMES = ("mu", "tau_max", "press")
@@ -95,7 +95,7 @@ def test_at_small_strain_they_are_the_differences_of_solves_within_one_set_of_st
         return small_numbers(small, changed_scene, contact.state)
 
     steps = (2e-5, 2e-7 if slide.friction.tau_max else 0.0, 2e-5)
-    table = derivative_table(of_slide(small, slide, contact))
+    table = derivative_table(slide_derivatives(small, slide, contact))
     assert_tables_agree(table, differences(numbers, slide, steps), numbers(slide))
 
 
@@ -103,14 +103,14 @@ def test_between_changes_of_state_forces_are_straight_in_the_depth_and_the_sed_a
     # Closed form: a slope of a straight line and of a parabola are those of their chords, however long.
     slide = SMALL["beside its limit"]
     contact = settled_state(slide, small)
-    derivatives = of_slide(small, slide, contact)
+    derivatives = slide_derivatives(small, slide, contact)
     chord_ends = [small_numbers(small, vary(slide, "press", by), contact.state) for by in (-5e-3, 5e-3)]
     assert (chord_ends[1] - chord_ends[0])[:3] / 1e-2 == pytest.approx(derivative_table(derivatives)[:3, 2], rel=1e-9)
 
 
 def test_a_given_force_drags_with_mu_times_it(small):
     slide = SMALL["under a force"]
-    derivatives = of_slide(small, slide, settled_state(slide, small))
+    derivatives = slide_derivatives(small, slide, settled_state(slide, small))
     assert derivatives.tangential.mu == pytest.approx(0.12, rel=1e-12)
     assert derivatives.tangential.normal_force == pytest.approx(0.4, rel=1e-12)
     assert derivatives.normal == (0.0, 0.0, None, 1.0)
@@ -127,13 +127,13 @@ def test_one_point_on_springs_answers_as_its_formula_says():
     """N = d / (3 + s mu b), and at the bound N = (d - s b tau L) / 3, with s = -1 for a slide along +x."""
     d, b, mu, tau, length = 0.6, 0.8, 0.5, 0.04, 0.7
     newton, load = springs(b), LoadState(d, mu, sense=-1)
-    drag_slopes, push_slopes = newton.follows(of_skin(newton, solve_full_slip(newton, load)))
+    drag_slopes, push_slopes = newton.force_changes(skin_derivatives(newton, solve_full_slip(newton, load)))
     soft = 3.0 - mu * b
     assert push_slopes == pytest.approx([b * d / soft**2, 0.0, 1.0 / soft], rel=1e-13)
     assert drag_slopes == pytest.approx([-d / soft - mu * b * d / soft**2, 0.0, -mu / soft], rel=1e-13)
     bounded = solve_full_slip(newton, load._replace(tau=tau))
     assert bounded.state.tolist() == [SHEAR_LIMITED, OPEN]
-    drag_slopes, push_slopes = newton.follows(of_skin(newton, bounded))
+    drag_slopes, push_slopes = newton.force_changes(skin_derivatives(newton, bounded))
     assert push_slopes == pytest.approx([0.0, b * length / 3.0, 1.0 / 3.0], rel=1e-13)
     assert drag_slopes == pytest.approx([0.0, -length, 0.0], rel=1e-13)
 
@@ -154,7 +154,7 @@ def test_at_a_kink_each_side_has_the_slope_of_its_own_states(small):
     for side, depth in ((-1.0, low), (1.0, high)):
         far, near = (small.numbers([solve_at(depth + side * by)])[0, 0] for by in (1e-3, 0.0))
         slope, far_slope = (
-            of_slide(small, vary(slide, "press", touch_depth - 1.2), solve_at(touch_depth)).sed.indentation
+            slide_derivatives(small, vary(slide, "press", touch_depth - 1.2), solve_at(touch_depth)).sed.indentation
             for touch_depth in (depth, depth + side * 1e-3)
         )
         assert side * (far - near) / 1e-3 == pytest.approx((slope + far_slope) / 2.0, rel=1e-6)  # a parabola's chord
@@ -167,7 +167,7 @@ def test_a_state_that_sticks_has_no_derivatives_of_its_own(small):
     contact = settled_state(SMALL["without a bound"], small)
     sticking_state = replace(contact, state=np.where(contact.state == SLIP, STICK, contact.state).astype(np.int32))
     with pytest.raises(ValueError, match="depends on the way"):
-        of_slide(small, SMALL["without a bound"], sticking_state)
+        slide_derivatives(small, SMALL["without a bound"], sticking_state)
 
 
 # Finite strain
@@ -214,7 +214,7 @@ def test_at_finite_strain_they_are_the_differences_of_solves_within_one_set_of_s
         return finite_numbers(finite, changed_scene, state)
 
     steps = (1e-5, 1e-7 if slide.friction.tau_max else 0.0, 1e-5)
-    table = derivative_table(of_slide(finite, slide, state))
+    table = derivative_table(slide_derivatives(finite, slide, state))
     assert_tables_agree(table, differences(numbers, slide, steps), numbers(slide))
 
 
@@ -234,7 +234,7 @@ def test_how_the_sed_of_a_patch_bends_is_a_complex_step_of_its_energy(law):
     )
     rng = np.random.default_rng(2)
     u, steps = rng.uniform(-0.015, 0.015, mesh.nodes.shape), rng.normal(size=(*mesh.nodes.shape, 2))
-    slopes = slope(probes, u, steps)[0]
+    slopes = response_derivatives(probes, u, steps)[0]
     for column in range(2):
         expected = average(body, probes, u + 1e-30j * steps[..., column])
         assert np.real(expected) == pytest.approx(probes.average(u), rel=1e-12)
@@ -265,4 +265,4 @@ def test_a_state_that_is_no_slide_has_no_derivatives_of_its_own(finite):
     slide = FINITE["without a bound"]
     state = slip(finite, slide)
     with pytest.raises(ValueError, match="depends on the way"):
-        of_slide(finite, slide, replace(state, load=state.load._replace(sense=0)))
+        slide_derivatives(finite, slide, replace(state, load=state.load._replace(sense=0)))

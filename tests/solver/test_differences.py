@@ -15,7 +15,7 @@ PUBLISHED = scene(STICKINESS[0])
 
 def surface(numbers, nested, edges=(0.0, 0.0, 0.0, 0.0)):
     names = ("sed_ending", "normal_force", "tangential_force", "indentation")
-    nested_numbers = SimpleNamespace(numbers=np.array(nested), of_edges=np.array([edges]), order=2.0)
+    nested_numbers = SimpleNamespace(numbers=np.array(nested), edge_changes=np.array([edges]), order=2.0)
     return SimpleNamespace(scene=PUBLISHED, nested=nested_numbers, **dict(zip(names, numbers, strict=True)))
 
 

@@ -89,7 +89,7 @@ def test_an_error_that_falls_with_the_square_of_an_element_is_known_and_edges_ad
     estimate = errors(sliding, truth * (1.0 + error), nested, None)
     assert estimate.sed == pytest.approx(error / (1.0 + error), rel=1e-12)
     assert estimate.corrected == pytest.approx(error / 4.0 / (1.0 + error / 4.0), rel=1e-12)
-    with_edges = errors(sliding, truth * (1.0 + error), replace(nested, of_edges=edges), None)
+    with_edges = errors(sliding, truth * (1.0 + error), replace(nested, edge_changes=edges), None)
     assert with_edges.sed - estimate.sed == pytest.approx(0.01 / 3.0 / 1.04, rel=1e-12)
     assert with_edges.corrected - estimate.corrected == pytest.approx(0.01 / 3.0 / 1.01, rel=1e-12)
     assert with_edges.width - estimate.width == pytest.approx(0.005 / 1.04, rel=1e-12)  # it follows an edge by a line
@@ -103,7 +103,7 @@ def test_the_sed_follows_an_edge_of_contact_by_a_parabola_about_a_place_within_h
         sample = random_scene("axis", number, "small")
         finger = LinearFinger.of(sample, Sizing(8.0, expected_depth(sample), margin=4.0))
         state, newton = nearest_state(sample, finger), finger.newton
-        x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
+        x = np.ascontiguousarray(state.skin_positions(newton.condensed)[:, 0])
         newton.linearise(state, state.load, x, 0, None)
 
         def sed_change(edge, nodes, state=state, newton=newton, x=x, finger=finger):

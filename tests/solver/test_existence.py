@@ -57,7 +57,7 @@ def test_a_press_whose_skin_folds_without_friction_is_refused_with_the_depth_up_
     finger = FiniteFinger.of(scene, Sizing(8.0, 4.1, margin=3.0))
     depths = np.linspace(0.1, 0.95 * deepest, 40).tolist()
     *_, pressed = march(finger.newton, [LoadState(depth, mu, sense=TOWARDS_TIP) for depth in depths])
-    assert finger.skin_compression(pressed).lowest == pytest.approx(0.60, abs=0.03)  # near 0.54, where surfaces fold
+    assert finger.skin_compression(pressed).least_stretch == pytest.approx(0.60, abs=0.03)  # they fold at 0.54
     with pytest.raises(NoSteadyState) as again:
         solve(replace(scene, loading=Loading(1.06 * deepest)))
     assert again.value.limit_indentation == pytest.approx(deepest, rel=0.02)
@@ -109,7 +109,7 @@ def test_skin_that_nearly_all_slips_at_the_bound_drags_with_the_bound_on_all_tha
     finger = published(fineness, depth)
     state = proven_slide(finger, LoadState(depth, 1000.0, tau, sense))
     touching = np.flatnonzero(state.touching)
-    x = state.place(finger.newton.condensed)[:, 0]
+    x = state.skin_positions(finger.newton.condensed)[:, 0]
     longest = x[min(touching[-1] + 1, len(x) - 1)] - x[max(touching[0] - 1, 0)]  # to the neighbours that do not touch
     assert tau * (x[touching[-1]] - x[touching[0]]) * 0.99 <= sense * state.force[0] <= tau * longest * 1.01
 

@@ -199,7 +199,7 @@ def test_compiled_forces_and_tangents_agree_with_the_plain_ones_and_with_differe
     np.testing.assert_allclose(newton.condensed.all_forces, expected[:-1], atol=1e-13 * scale)
     # the same forces for a tangent kept from there
     other_u = 0.7 * u
-    assert newton.condensed.resist(other_u) > 0.0
+    assert newton.condensed.assemble_forces(other_u) > 0.0
     force, _ = oracle_forces_and_tangents(newton, other_u, pressure)
     expected[:] = 0.0
     np.add.at(expected, body.elements.unknown.reshape(-1, 16), force[:, :16] - (across @ force[:, 16:, None])[:, :, 0])
@@ -220,7 +220,7 @@ def test_a_pressed_block_is_in_equilibrium_with_what_it_holds_of_the_past():
     pushes = []
     for depth, duration in ((0.1, 0.1), (0.2, 0.1), (0.2, 0.5), (0.2, 5.0)):
         newton.condensed.ready(duration)
-        state = newton.settle(state, LoadState(depth, 0.3), Termination(1e-9))
+        state = newton.solve(state, LoadState(depth, 0.3), Termination(1e-9))
         force, _ = oracle.forces_and_tangents(body, state.u, np.zeros((len(body.elements.nodes), 3)))
         total = np.zeros(body.mesh.nodes.shape)
         np.add.at(total, body.elements.nodes, (force + newton.condensed.excess(state.u)).reshape(-1, 9, 2))
@@ -240,7 +240,7 @@ def test_what_a_pressed_block_keeps_and_friction_does_not_take_is_what_its_tissu
     state, states, rates, steps, time = EquilibriumState.undeformed(body.condensed), [], [0.0], 24, 0.5
     for number in range(1, steps + 1):
         newton.condensed.ready(time / steps)
-        state = newton.settle(state, LoadState(0.2 * number / steps, 0.3), Termination(1e-9))
+        state = newton.solve(state, LoadState(0.2 * number / steps, 0.3), Termination(1e-9))
         newton.condensed.commit(state.u, time / steps)
         states.append(state)
         metrics = [

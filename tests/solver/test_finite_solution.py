@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, NoSteadyState, NotConverged, Scene, Solve, solve, solve_many
-from solver.accuracy.audits import audits, refuse_unsound, rounding
+from solver.accuracy.audits import audits, refuse_unsound, round_off_warnings
 from solver.accuracy.error_estimate import NO_NESTED_STATE
 from solver.contact import LoadState
 from solver.equilibrium.load_stepping import solve_full_slip
@@ -83,8 +83,8 @@ def test_a_force_told_of_the_neighbouring_node_is_unbalanced_there():
     assert wrong_audits["inner_forces"] == pytest.approx(float(np.abs(moved_force).max()) / state.force[1], rel=1e-6)
     with pytest.raises(NotConverged, match=r"Forces balance to 0\.\d+ only"):
         refuse_unsound(wrong_audits, 2.0)
-    assert rounding(sound_audits) == ()
-    assert rounding(sound_audits | {"inner_forces": 2e-8})[0].startswith("Forces balance to 2e-08 only")
+    assert round_off_warnings(sound_audits) == ()
+    assert round_off_warnings(sound_audits | {"inner_forces": 2e-8})[0].startswith("Forces balance to 2e-08 only")
 
 
 CONTRAST_ERROR = 0.05  # part of the range of several surfaces that differences between them may be off

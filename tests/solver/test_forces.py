@@ -285,18 +285,20 @@ def test_a_limit_under_a_force_has_a_slide_a_little_less_deep_and_none_a_little_
 def test_a_largest_depth_that_has_a_slide_beyond_it_is_no_limit_under_a_force(monkeypatch):
     """Simulated: the force is lost while it grows, and the branch seems to end at two thirds of the depth."""
     press = Scene(friction=Friction(0.3), loading=Loading(normal_force=0.1), solve=Solve("finite", tolerance=COARSE))
-    expected, reach_in_depth, march = solve(press), limit_point.reach_in_depth, load_stepping.march
+    expected, depth_limit, march = solve(press), limit_point.depth_limit, load_stepping.march
 
     def end_too_early(scene, load):
         depth = expected.indentation / 1.5
-        return replace(reach_in_depth(scene, load._replace(depth=depth)), value=depth, limited=True, lost=False)
+        return replace(
+            depth_limit(scene, load._replace(depth=depth)), value=depth, ends_early=True, corrector_failed=False
+        )
 
     def lose_on_the_way(newton, course, start):
         yield from march(newton, course[:3], start)
         raise NotConverged("lost")
 
     for module in (existence, finite_states):
-        monkeypatch.setattr(module, "reach_in_depth", end_too_early)
+        monkeypatch.setattr(module, "depth_limit", end_too_early)
     monkeypatch.setattr(load_stepping, "march", lose_on_the_way)
     prediction = solve(press)
     assert prediction.normal_force == pytest.approx(0.1, rel=1e-8)

@@ -58,8 +58,8 @@ def springs(coupling=COMPLIANCE[1]):
 
 
 def points_after(body, state, last_state):
-    place, bone_travel = state.place(body), state.load.travel - last_state.load.travel
-    slip = place[:, 0] - last_state.place(body)[:, 0] - bone_travel
+    place, bone_travel = state.skin_positions(body), state.load.travel - last_state.load.travel
+    slip = place[:, 0] - last_state.skin_positions(body)[:, 0] - bone_travel
     gap = place[:, 1] - state.load.depth
     return PointStates(state.state, state.sense.astype(float), state.normal, state.tangential, gap, slip, LENGTH)
 
@@ -68,7 +68,7 @@ def drive(law):
     body = springs()
     newton, states = Newton(body), [EquilibriumState.undeformed(body)]
     for depth, travel in DRIVES:
-        states.append(newton.settle(states[-1], LoadState(depth, law.mu, law.tau_max, travel=-travel)))
+        states.append(newton.solve(states[-1], LoadState(depth, law.mu, law.tau_max, travel=-travel)))
     return [points_after(body, state, last_state) for last_state, state in pairwise(states)]
 
 
@@ -119,16 +119,16 @@ def rub(newton, law, drives=((0.02, 0.0), (0.06, 0.0), (0.06, 0.004), (0.06, 0.0
                                  (0.06, 0.05), (0.03, 0.05), (-0.1, 0.05))):  # fmt: skip
     states = [EquilibriumState.undeformed(newton.condensed)]
     for depth, travel in drives:
-        states.append(newton.settle(states[-1], LoadState(depth, law.mu, law.tau_max, 0, travel), Termination(1e-13)))
+        states.append(newton.solve(states[-1], LoadState(depth, law.mu, law.tau_max, 0, travel), Termination(1e-13)))
     return states
 
 
 def drive_finite(law, newton):
     points, states = [], rub(newton, law)
     for last_state, state in pairwise(states):
-        place, bone_travel = state.place(newton.condensed), state.load.travel - last_state.load.travel
+        place, bone_travel = state.skin_positions(newton.condensed), state.load.travel - last_state.load.travel
         length = np.maximum(oracle.tributary(place[:, 0]), 0.0)
-        slip = place[:, 0] - last_state.place(newton.condensed)[:, 0] - bone_travel
+        slip = place[:, 0] - last_state.skin_positions(newton.condensed)[:, 0] - bone_travel
         drag, push = state.reaction.T
         touching = state.state != OPEN  # elsewhere the body's own unbalanced forces, round-off of the iterations
         drag, push = np.where(touching, drag, 0.0), np.where(touching, push, 0.0)
@@ -205,7 +205,7 @@ def test_points_on_springs_carry_what_their_springs_and_the_law_say(law):
         normal = np.maximum(depth - body.rest[:, 1], 0.0) / COMPLIANCE[0]
         limit = np.minimum(law.mu * normal, law.tau_max * LENGTH if law.tau_max < np.inf else np.inf)
         drag = np.clip((state.u[:, 0] - state.load.travel - travel) / COMPLIANCE[2], -limit, limit)
-        state = newton.settle(state, LoadState(depth, law.mu, law.tau_max, travel=-travel))
+        state = newton.solve(state, LoadState(depth, law.mu, law.tau_max, travel=-travel))
         np.testing.assert_allclose(state.normal, normal, atol=1e-11 * 0.1)  # round-off, by the largest force
         np.testing.assert_allclose(state.tangential, drag, atol=1e-11 * 0.1)
 
@@ -249,15 +249,15 @@ def test_a_state_of_all_kinds_at_finite_strain_moves_as_its_tangent_says(cushion
     law = BOUND_OF_CUSHION
     start = rub(cushion, law, ((0.06, 0.0), (0.06, 0.004)))[-1]
     load = LoadState(0.06, law.mu, law.tau_max, 0, 0.015)
-    state = cushion.settle(start, load, Termination(1e-13))
+    state = cushion.solve(start, load, Termination(1e-13))
     assert set(state.state.tolist()) == {OPEN, STICK, SLIP, SHEAR_LIMITED}
-    anchor = start.place(cushion.condensed)[:, 0] + load.travel - start.load.travel
+    anchor = start.skin_positions(cushion.condensed)[:, 0] + load.travel - start.load.travel
     assert cushion.linearise(state, load, anchor)
     tangent, skin = cushion.steps.copy(), cushion.condensed.body.mesh.skin
     for column, name in ((BY_DEPTH, "depth"), (BY_FRICTION, "mu"), (BY_TRAVEL, "travel")):
         step = 1e-5
         ahead, behind = (
-            cushion.settle(start, load._replace(**{name: getattr(load, name) + h}), Termination(1e-13))
+            cushion.solve(start, load._replace(**{name: getattr(load, name) + h}), Termination(1e-13))
             for h in (step, -step)
         )
         np.testing.assert_array_equal(ahead.state, behind.state)

@@ -155,7 +155,7 @@ def test_contact_rows_are_the_derivatives_of_their_conditions():
         pressure = oracle.pressure(body, u)
         equilibrium = EquilibriumState(u, pressure, state, sense, start.reaction, load, 0)
         force = oracle.system(body, u, pressure)[0]
-        place = equilibrium.place(newton.condensed)
+        place = equilibrium.skin_positions(newton.condensed)
         length = oracle.tributary(place[:, 0])
         out = force.copy()
         for i in range(len(body.mesh.skin)):

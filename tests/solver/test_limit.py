@@ -9,7 +9,7 @@ from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState
 from solver.body.finite import FiniteBody
 from solver.constitutive import NeoHooke, Ogden
 from solver.contact import LoadState
-from solver.continuation import BRANCH, Continuation, existence, finite_states, folds_at, limit_point
+from solver.continuation import BRANCH, Continuation, critical_stretch, existence, finite_states, limit_point
 from solver.equilibrium import BY_FRICTION, Newton
 from solver.equilibrium.finger import FiniteFinger, finite_laws
 from solver.equilibrium.load_stepping import solve_full_slip
@@ -18,7 +18,7 @@ from tests.solver.finite_examples import published
 
 SLOW = pytest.mark.slow
 TOWARDS_TIP = -1  # the bone goes along +x, so the surface pulls the skin along -x
-SQUEEZED = [(1.8, 69.4, (0.1525, 0.0775, 0.0303)), (1.73, 65.9, (0.1198, 0.0576, 0.0306))]  # drawn at random
+KINK_STRETCH = [(1.8, 69.4, (0.1525, 0.0775, 0.0303)), (1.73, 65.9, (0.1198, 0.0576, 0.0306))]  # drawn at random
 
 
 def squeezed_scene(depth, angle, tissues):
@@ -37,10 +37,10 @@ def squeezed_scene(depth, angle, tissues):
     [pytest.param(1.0, 0.987, marks=SLOW), (1.5, 0.609), (2.0, 0.373), pytest.param(2.5, 0.233, marks=SLOW)],
 )
 def test_friction_has_the_limit_that_several_meshes_and_orders_of_another_code_found(depth, largest):
-    reach = limit_point.reach_in_friction(
+    reach = limit_point.friction_limit(
         Scene(friction=Friction(0.0), loading=Loading(depth)), LoadState(depth, 0.0, np.inf, TOWARDS_TIP), 2.0
     )
-    assert reach.limited
+    assert reach.ends_early
     assert reach.value == pytest.approx(largest, rel=0.03)
 
 
@@ -55,25 +55,25 @@ def test_friction_has_the_limit_that_several_meshes_and_orders_of_another_code_f
 )
 def test_depth_has_the_limit_that_another_code_found(mu, tau, largest):
     scene = Scene(friction=Friction(mu), loading=Loading(2.0))
-    reach = limit_point.reach_in_depth(scene, LoadState(2.0, mu, tau, TOWARDS_TIP))
-    assert reach.limited
+    reach = limit_point.depth_limit(scene, LoadState(2.0, mu, tau, TOWARDS_TIP))
+    assert reach.ends_early
     assert reach.value == pytest.approx(largest, rel=0.03)
 
 
 @SLOW
-@pytest.mark.parametrize(("depth", "angle", "tissues"), SQUEEZED)
+@pytest.mark.parametrize(("depth", "angle", "tissues"), KINK_STRETCH)
 def test_where_skin_folds_at_one_place_both_limits_are_those_of_a_mesh_of_half_the_size(
     depth, angle, tissues, monkeypatch
 ):
     scene = squeezed_scene(depth, angle, tissues)
     load = LoadState(depth, 0.85, np.inf, TOWARDS_TIP)
-    mu, deepest = limit_point.reach_in_friction(scene, load, 2.0), limit_point.reach_in_depth(scene, load)
+    mu, deepest = limit_point.friction_limit(scene, load, 2.0), limit_point.depth_limit(scene, load)
     monkeypatch.setattr(limit_point, "FINENESS", 2.0 * limit_point.FINENESS)
     monkeypatch.setattr(mesher, "FOLD", tuple(size / 2.0 for size in mesher.FOLD))
     finer = squeezed_scene(depth + 1e-9, angle, tissues)  # what was answered is not asked again
     load = load._replace(depth=depth + 1e-9)
-    assert mu.value == pytest.approx(limit_point.reach_in_friction(finer, load, 2.0).value, rel=0.015)
-    assert deepest.value == pytest.approx(limit_point.reach_in_depth(finer, load).value, rel=0.01)
+    assert mu.value == pytest.approx(limit_point.friction_limit(finer, load, 2.0).value, rel=0.015)
+    assert deepest.value == pytest.approx(limit_point.depth_limit(finer, load).value, rel=0.01)
 
 
 def test_a_branch_that_reaches_what_was_asked_for_is_the_direct_answer():
@@ -83,8 +83,8 @@ def test_a_branch_that_reaches_what_was_asked_for_is_the_direct_answer():
     branch = Continuation(finger, BY_FRICTION, 0.54).branch(start, load.mu)
     second_branch = Continuation(finger, BY_FRICTION, 0.54).branch(branch.last, load.mu)  # nothing is left to follow
     assert second_branch.states == (branch.last,)
-    assert not second_branch.limited
-    assert not branch.limited
+    assert not second_branch.ends_early
+    assert not branch.ends_early
     close = BRANCH.tolerance * finger.newton.length_scale
     np.testing.assert_allclose(branch.last.u, solve_full_slip(finger.newton, load).u, atol=close)
 
@@ -92,7 +92,7 @@ def test_a_branch_that_reaches_what_was_asked_for_is_the_direct_answer():
 def test_every_friction_beyond_the_end_of_a_branch_has_the_same_limit():
     scene, load = Scene(friction=Friction(0.0), loading=Loading(2.2)), LoadState(2.2, 0.0, np.inf, TOWARDS_TIP)
     targets = (1.1, 0.33, 0.7)  # in pieces of the branch that are traced one after another
-    assert len({limit_point.reach_in_friction(scene, load, target).value for target in targets}) == 1
+    assert len({limit_point.friction_limit(scene, load, target).value for target in targets}) == 1
 
 
 @pytest.mark.parametrize("exponent", [None, 2.0])
@@ -100,11 +100,11 @@ def test_a_surface_that_keeps_its_volume_folds_where_biot_found(exponent):
     x = np.roots([1.0, 1.0, 3.0, -1.0])  # Biot 1963: x^3 + x^2 + 3 x - 1 = 0 for the square of the stretch
     biot = float(np.sqrt(x[np.isreal(x)].real[0]))
     law = NeoHooke(0.136, 0.4999999) if exponent is None else Ogden(0.136, 0.4999999, exponent)
-    assert folds_at(law) == pytest.approx(biot, rel=1e-5)
+    assert critical_stretch(law) == pytest.approx(biot, rel=1e-5)
 
 
 def test_skin_that_stiffens_folds_later():
-    folds = [folds_at(Ogden(0.136, 0.48, exponent)) for exponent in (2.0, 3.0, 6.0, 9.0)]
+    folds = [critical_stretch(Ogden(0.136, 0.48, exponent)) for exponent in (2.0, 3.0, 6.0, 9.0)]
     assert folds == sorted(folds, reverse=True)
 
 
@@ -140,18 +140,20 @@ def test_no_limit_of_friction_is_told_where_growing_depth_arrives_beyond_it(monk
     scene = Scene(friction=Friction(0.6), loading=Loading(2.0, "-x"), solve=Solve("finite"))
     load = LoadState(2.0, 0.6, np.inf, TOWARDS_TIP)
     search = limit_point.BranchSearch(scene, load, BY_FRICTION, load.mu)
-    branch_end = limit_point.Reach(search, 0.373, limited=True, lost=False, least=0.55, numbers=np.ones(3))
+    branch_end = limit_point.ContinuationLimit(
+        search, 0.373, ends_early=True, corrector_failed=False, least_stretch=0.55, numbers=np.ones(3)
+    )
 
     def by_depth(_scene, target):
         # with a little less friction 2 mm are reached
-        return replace(branch_end, value=1.5, limited=target.mu == load.mu)
+        return replace(branch_end, value=1.5, ends_early=target.mu == load.mu)
 
     monkeypatch.setattr(existence, "_direct_states", lambda *_: iter(()))
-    monkeypatch.setattr(existence, "reach_in_friction", lambda *_: branch_end)
-    monkeypatch.setattr(existence, "reach_in_depth", by_depth)
+    monkeypatch.setattr(existence, "friction_limit", lambda *_: branch_end)
+    monkeypatch.setattr(existence, "depth_limit", by_depth)
     with pytest.raises(NotConverged, match=r"followed up to mu = 0\.373 and lost there"):
         existence.proven_slide(FiniteFinger.of(scene, mesher.Sizing(5.0, 2.0)), load)
-    monkeypatch.setattr(existence, "reach_in_depth", lambda *_: replace(branch_end, value=1.5))
+    monkeypatch.setattr(existence, "depth_limit", lambda *_: replace(branch_end, value=1.5))
     with pytest.raises(NoSteadyState) as refusal:
         existence.proven_slide(FiniteFinger.of(scene, mesher.Sizing(5.0, 2.0)), load)
     assert (refusal.value.limit_mu, refusal.value.limit_indentation) == (0.373, 1.5)

@@ -30,16 +30,16 @@ def test_a_step_that_fails_is_halved_and_the_rest_goes_in_steps_of_that_size():
 
 
 def test_steps_grow_again_where_they_are_told_to():
-    assert advance_up_to(0.3, StepControl(growth=2.0)) == ([0.25, 0.5, 0.75, 1.0], [1.0, 0.5, 0.75, 1.0])
+    assert advance_up_to(0.3, StepControl(step_growth=2.0)) == ([0.25, 0.5, 0.75, 1.0], [1.0, 0.5, 0.75, 1.0])
 
 
 def test_what_the_smallest_step_does_not_pass_is_refused_with_where_it_began():
     with pytest.raises(NotConverged, match=r"0\.5 0\.125 too far"):
-        advance_up_to(1.0, StepControl(smallest=0.25), wall=0.6)
+        advance_up_to(1.0, StepControl(min_step=0.25), wall=0.6)
 
 
 def test_a_path_stops_between_two_steps():
     steps = []
     with pytest.raises(Cancelled), interruptible(lambda part: part < 2, lambda: len(steps)):
-        advance(steps.append, lambda *_: NotConverged(""), StepControl(first=0.25))
+        advance(steps.append, lambda *_: NotConverged(""), StepControl(first_step=0.25))
     assert steps == [0.25, 0.5]

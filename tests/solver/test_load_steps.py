@@ -22,17 +22,17 @@ def numbers_after(parts, excess):
     return np.array([USUAL - excess + excess / part for part in parts])
 
 
-@pytest.mark.parametrize(("tolerance", "times"), [(0.02, 1), (0.01, 2), (0.005, 4), (1e-4, 16)])
-def test_half_the_tolerance_asks_for_twice_the_steps_up_to_a_limit(tolerance, times):
+@pytest.mark.parametrize(("tolerance", "factor"), [(0.02, 1), (0.01, 2), (0.005, 4), (1e-4, 16)])
+def test_half_the_tolerance_asks_for_twice_the_steps_up_to_a_limit(tolerance, factor):
     fewer = numbers_after(PARTS, 0.0028 * USUAL)  # two estimates of 0.28 %: 0.56 %, three tenths of a tolerance at most
-    assert Steps.of(USUAL, fewer, tolerance).times == times
+    assert Steps.of(USUAL, fewer, tolerance).factor == factor
 
 
 def test_an_error_in_proportion_to_the_step_is_taken_out_of_what_a_coarse_mesh_says():
     excess = np.resize([4e-3, 0.0, 1e-3, 0.0, -2e-3, 0.0, 4e-3], COUNT)
     steps = Steps.of(USUAL, numbers_after(PARTS, excess), 0.003)
-    np.testing.assert_allclose(steps.extrapolate(USUAL), USUAL - excess + excess / steps.times, rtol=1e-12)
-    np.testing.assert_allclose(steps.error, 2.0 * np.abs(excess) / steps.times, atol=1e-15)
+    np.testing.assert_allclose(steps.extrapolate(USUAL), USUAL - excess + excess / steps.factor, rtol=1e-12)
+    np.testing.assert_allclose(steps.error, 2.0 * np.abs(excess) / steps.factor, atol=1e-15)
 
 
 def test_a_course_that_agrees_with_the_usual_one_by_chance_leaves_the_others_estimate():

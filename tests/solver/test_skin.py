@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.body.skin import SQUEEZED, SkinCompression, crosses_itself
+from solver.body.skin import KINK_STRETCH, SkinCompression, crosses_itself
 
 ELEMENTS = 5
 BEFORE = np.stack([np.cumsum([0.0, *np.geomspace(0.1, 0.3, 2 * ELEMENTS)]), np.zeros(2 * ELEMENTS + 1)], axis=1)
@@ -32,9 +32,9 @@ def test_stretch_at_the_ends_of_elements_is_exact_where_it_varies_linearly():
     after = BEFORE.copy()
     after[:, 0] -= 0.2 * BEFORE[:, 0] ** 2  # stretch 1 - 0.4 x
     skin = SkinCompression.of(BEFORE, after - BEFORE, LOOSE, OPEN)
-    assert skin.lowest == pytest.approx(1.0 - 0.4 * BEFORE[-1, 0], rel=1e-12)
-    assert skin.place == ELEMENTS - 1
-    assert skin.least == pytest.approx(1.0 - 0.2 * (BEFORE[-1, 0] + BEFORE[-2, 0]), rel=1e-12)  # of its last half
+    assert skin.least_stretch == pytest.approx(1.0 - 0.4 * BEFORE[-1, 0], rel=1e-12)
+    assert skin.element == ELEMENTS - 1
+    assert skin.least_chord == pytest.approx(1.0 - 0.2 * (BEFORE[-1, 0] + BEFORE[-2, 0]), rel=1e-12)  # of its last half
 
 
 def test_a_crease_is_the_jump_of_the_tangent():
@@ -47,7 +47,7 @@ def test_a_crease_is_the_jump_of_the_tangent():
 def test_a_jump_of_the_tangent_is_no_crease_where_skin_is(reason):
     touching, loose = OPEN.copy(), LOOSE.copy()
     touching[4], loose[2] = reason == "touching", reason != "held"
-    after = bent_at_a_joint(1.1 * SQUEEZED if reason == "stretched" else 0.6, 1.1)
+    after = bent_at_a_joint(1.1 * KINK_STRETCH if reason == "stretched" else 0.6, 1.1)
     assert SkinCompression.of(BEFORE, after - BEFORE, loose, touching).kink == pytest.approx(0.0, abs=1e-12)
 
 
@@ -57,10 +57,10 @@ def test_held_skin_is_not_squeezed():
     loose_skin, held = (
         SkinCompression.of(BEFORE, after - BEFORE, loose, OPEN) for loose in (LOOSE, np.arange(ELEMENTS) < 2)
     )
-    assert loose_skin.place == 2
-    assert loose_skin.least < 0.2
-    assert held.least == pytest.approx(1.0)
-    assert SkinCompression.of(BEFORE, after - BEFORE, ~LOOSE, OPEN).least == np.inf
+    assert loose_skin.element == 2
+    assert loose_skin.least_chord < 0.2
+    assert held.least_chord == pytest.approx(1.0)
+    assert SkinCompression.of(BEFORE, after - BEFORE, ~LOOSE, OPEN).least_chord == np.inf
 
 
 def side(a, b, c):

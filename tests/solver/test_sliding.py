@@ -61,13 +61,13 @@ def test_the_surface_and_the_bone_push_alike(bounded_slide):
 def test_forces_of_touching_points_obey_the_friction_law(bounded_slide):
     newton, state = bounded_slide
     load = state.load
-    length = oracle.tributary(state.place(newton.condensed)[:, 0])
+    length = oracle.tributary(state.skin_positions(newton.condensed)[:, 0])
     slip, bounded, is_open = (state.state == code for code in (SLIP, SHEAR_LIMITED, OPEN))
     np.testing.assert_allclose(state.reaction[slip, 0], load.mu * state.reaction[slip, 1], atol=1e-12)
     np.testing.assert_allclose(state.reaction[bounded, 0], load.tau * length[bounded], atol=1e-12)
     np.testing.assert_allclose(state.reaction[is_open], 0.0, atol=1e-12)
     assert (state.reaction[slip | bounded, 1] >= -1e-12).all()
-    height = state.place(newton.condensed)[:, 1] - load.depth
+    height = state.skin_positions(newton.condensed)[:, 1] - load.depth
     assert height.min() > -1e-10
 
 

@@ -61,7 +61,7 @@ def test_dead_loads_below_the_friction_limit_leave_the_stick_zone_of_cattaneo_an
     mesh, loads = round_foot(part, held=held)
     free = () if held else ("x", "y", "turn")
     body = LinearBody.of(mesh, [Hooke(YOUNG, NU), Hooke(1e-5, 0.3)], loads, free=free).condensed
-    state = Newton(body).settle(EquilibriumState.undeformed(body), LoadState(0.0, MU))
+    state = Newton(body).solve(EquilibriumState.undeformed(body), LoadState(0.0, MU))
     load, drag = state.normal.sum(), -state.tangential.sum()
     assert load == pytest.approx(LOAD, rel=0.01 if held else 1e-9)
     assert drag == pytest.approx(part * MU * LOAD, rel=0.01 if held else 1e-9)
@@ -78,7 +78,7 @@ def test_skin_that_dead_loads_leave_clear_of_the_surface_sticks_where_they_have_
     body = LinearBody.of(mesh, [Hooke(YOUNG, NU), Hooke(1e-4, 0.3)], loads).condensed
     start_depth = -2.0  # mm: the loads lower the foot by a third of one
     start = replace(EquilibriumState.undeformed(body), u=body.free_displacement(), load=LoadState(start_depth, MU))
-    assert (start.place(body)[:, 1] - start_depth).min() > 0.0
-    state = Newton(body).settle(start, LoadState(0.0, MU))
+    assert (start.skin_positions(body)[:, 1] - start_depth).min() > 0.0
+    state = Newton(body).solve(start, LoadState(0.0, MU))
     assert state.normal.sum() > 0.9 * LOAD
     assert abs(state.tangential.sum()) < 0.05 * MU * LOAD  # the pad carries the drag

@@ -181,7 +181,7 @@ def stress_at(body: LinearBody, displacement: Array, element: Indices, local: Ar
     mesh, elastic = body.mesh, body.elastic
     probes = Probes.at(mesh, elastic.centre, element, local)
     strain = probes.displacement_gradient(mesh, displacement)
-    at = elastic.state(elastic.places(probes), displacement)
+    at = elastic.state(elastic.probe_data(probes), displacement)
     pressure = (at.lame * at.dilatation)[:, None, None] * np.eye(2)
     return at.shear[:, None, None] * (strain + np.swapaxes(strain, 1, 2)) + pressure
 
