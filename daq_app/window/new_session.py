@@ -15,7 +15,7 @@ from sessions.file_access import failure_sentence
 from sessions.plan.plan import NORMALS, Frame, Hand, Phase
 from sessions.plan.protocols.planning import Body, StudyPlace, VisitSetting, is_code, plan
 from sessions.plan.protocols.protocol import AREAS, HEIGHTS, LARGEST_SEED, Protocol, phases_before, protocol
-from sessions.plan.study import Study, StudyError, enrol, is_study, open_study, study_key
+from sessions.plan.study import Study, StudyError, enrol, enrolled_visit, is_study, open_study
 from sessions.recording import Recording, RecordingError, Setting
 from sessions.recording.manifest import is_sealed
 from sessions.recording.recovery import is_in_use
@@ -144,10 +144,7 @@ def check_form(
         normal = form.normal if form.normal in NORMALS else None
         height = _number(form.height) or 0.0 if form.height.strip() else None
         session_plan = replace(session_plan, frame=session_plan.frame.with_values(normal, height, "measured"))
-    # In a study the folder's name states the purpose of the visit: the protocol is the same in all.
-    purpose = session_plan.protocol if study_place is None else "forces" if session_plan.forces else "scores"
-    parent = form.root_folder / PILOTS if form.pilot else form.parent_folder
-    folder = parent / f"{form.subject.strip()}_{purpose}_{now.strftime('%Y%m%dT%H%M%S')}"
+    folder = (form.root_folder / PILOTS if form.pilot else form.parent_folder) / session_plan.folder_name(now)
     hand: Kind = "simulated hand" if form.forces and bench.simulated else "people"
     people = People("simulated people" if form.simulated else hand, seed, session_protocol.simulated_friction)
     page_settings = [Setting("seed", seed, "", "set" if form.seed.strip() and study_place is None else "default")]
@@ -241,8 +238,7 @@ def _choose_protocol(form: SessionForm, new_seed: int) -> tuple[Protocol, int, B
         return protocol(form.protocol), int(form.seed) if form.seed.strip() else new_seed, None, None
     if form.pilot:
         return study.protocol, new_seed, None, None
-    member, key = study.member(form.subject.strip()), study_key(form.parent_folder)
-    return study.protocol, study.session_seed(member.slot), member.body, study.place(member, key)
+    return enrolled_visit(form.parent_folder, form.subject.strip())
 
 
 def _study(form: SessionForm) -> Study | None:

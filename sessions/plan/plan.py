@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from datetime import datetime
 from typing import Literal
 
 from sessions.toml_file import check_range
@@ -157,6 +158,11 @@ class SessionPlan:
     def blinded(self) -> bool:
         """Say whether the plan hides which stimulus bears which code."""
         return any(trial.stimulus.index is None for trial in self.trials)
+
+    def folder_name(self, start: datetime) -> str:
+        """Return the name of the session's folder; in a study, all of whose visits have one protocol, its purpose."""
+        purpose = self.protocol if self.study is None else "forces" if self.forces else "scores"
+        return f"{self.subject}_{purpose}_{start:%Y%m%dT%H%M%S}"
 
     def stroke_limit(self, trial: Trial) -> int:
         """Return how many strokes a trial may have; 1 where no block holds it."""

@@ -285,6 +285,13 @@ def note(folder: Path, kind: str, data: Mapping[str, Any]) -> Study:
     return _add_event(folder, "", lambda _: (kind, data))
 
 
+def enrolled_visit(folder: Path, subject: str) -> tuple[Protocol, int, Body, StudyPlace]:
+    """Return protocol, seed, body and place of a subject's visit, as its enrolment decided them. Raises StudyError."""
+    study = open_study(folder)
+    member = study.member(subject)
+    return study.protocol, study.session_seed(member.slot), member.body, study.place(member, study_key(folder))
+
+
 def study_key(folder: Path) -> Key | None:
     """Return the key of a blinded study, for the program alone; None where it is not blinded. Raises StudyError."""
     sha256 = open_study(folder).key_sha256

@@ -19,7 +19,7 @@ from drivers.transducer import flagged_words
 from sessions.plan.plan import NORMALS, Phase
 from sessions.plan.protocols.planning import Body, StudyPlace, VisitSetting, plan
 from sessions.plan.protocols.protocol import AREAS, Protocol, protocol
-from sessions.plan.study import open_study, study_key
+from sessions.plan.study import enrolled_visit
 from sessions.recording import Setting
 from sessions.run.resuming import RESUMABLE
 
@@ -68,9 +68,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         body=body,
         place=study_place,
     )
-    stamp = datetime.now().strftime("%Y%m%dT%H%M%S")
-    purpose = session_plan.protocol if study_place is None else "forces" if session_plan.forces else "scores"
-    folder = options.out or (options.study or Path("recordings")) / f"{options.subject}_{purpose}_{stamp}"
+    folder = options.out or (options.study or Path("recordings")) / session_plan.folder_name(datetime.now())
     console.note(measures_sentence(session_plan))
     simulated = options.simulate_subject
     people = (
@@ -102,9 +100,7 @@ def _choices(options: argparse.Namespace) -> tuple[Protocol, int, Body, StudyPla
     if options.study is None:
         seed = secrets.randbelow(2**31) if options.seed is None else options.seed
         return protocol(options.protocol), seed, body_of(options), None
-    study = open_study(options.study)
-    member = study.member(options.subject)
-    return study.protocol, study.session_seed(member.slot), member.body, study.place(member, study_key(options.study))
+    return enrolled_visit(options.study, options.subject)
 
 
 def _refuse_mixtures(options: argparse.Namespace, *, simulated_bench: bool) -> None:
