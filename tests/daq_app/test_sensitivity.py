@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from itertools import product
+from operator import attrgetter
 
 import pytest
 
@@ -80,6 +81,9 @@ def test_every_corner_of_the_usual_design_is_a_scene_that_may_be():
     design = usual_design(SCENE)
     for corner in product(*design.values()):
         with_values(SCENE, dict(zip(design, corner, strict=True)))
+    for name, (low, high) in design.items():
+        assert low <= attrgetter(name)(SCENE) <= high
+        assert low < high
 
 
 def test_what_a_design_leaves_as_it_is_is_named():

@@ -56,6 +56,27 @@ def test_every_corner_of_the_design_is_a_finger_that_can_be():
     sign_map.map_trials("small")
 
 
+def test_each_single_change_is_the_one_that_its_name_tells():
+    base = sign_map.published_finger()
+    for label, trial in sign_map.single_changes("small").items():
+        numbers = [float(number) for number in re.findall(r"[\d.]+", label)]
+        finger = trial.finger.finger
+        if label.startswith("receptor"):
+            assert trial.arcs == (numbers[0] if label.endswith("distal") else -numbers[0],)  # positive to the tip
+        elif label.startswith("tip radius"):
+            assert [finger.tip_radius] == numbers
+        elif label.startswith("contact angle"):
+            assert [finger.contact_angle] == numbers
+        elif label.startswith("pressed by"):
+            assert [trial.press.force] == numbers
+    changes = sign_map.single_changes("small")
+    materials = {name: trial.finger.materials for name, trial in changes.items()}
+    assert pytest.approx(base.materials.fat.E / 2) == materials["fat half as stiff"].fat.E
+    assert pytest.approx(3 * base.materials.epidermis.E) == materials["epidermis three times as stiff"].epidermis.E
+    assert changes["pressed a quarter less deep"].press.depth == 1 - 1 / 4
+    assert changes["finite strain"].finger.solve.kinematics == "finite"
+
+
 def test_what_is_kept_is_not_computed_again_and_a_line_cut_short_is(tmp_path, monkeypatch):
     trials = list(sign_map.single_changes("small").values())[2:5]
     keep = tmp_path / "answers.jsonl"

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 import test_ground_truth as ground_truth
 from closed_form import GAINS_ALONE, PLAIN, T, analyse, block, noisy
+from scipy import integrate, stats
 
-from sessions.strokes.bootstrap import BootstrapSettings, mean_inflation, stroke_intervals
+from sessions.strokes.bootstrap import BootstrapSettings, friction_draws, mean_inflation, stroke_intervals
 from sessions.strokes.contacts import onset_draws
 from sessions.strokes.stroke import StrokeCurve
 from simulators.bench import BenchSettings
@@ -16,6 +17,7 @@ from simulators.stroke import Course
 from simulators.subject import SimulatedSubject
 
 NUMBERS = ("mu_dynamic", "mu_max", "tau_max", "speed")
+NO_ERROR = BootstrapSettings(repeats=4000, gain_error=0.0, cross_talk=0.0, tilt_error=(0.0, 0.0))
 FORCES = ("normal_force", "tangential_force", "peak_normal", "peak_tangential")
 
 
@@ -85,38 +87,85 @@ def test_the_instants_of_a_held_finger_have_intervals_and_the_direction_is_sure(
             assert stroke.break_away < intervals.slide_onset[1]
 
 
-def oblique(degrees, noise):
-    """Return a stroke at an angle to the x axis whose centre of pressure has white noise [mm]."""
-    rng, t = np.random.default_rng(0), np.arange(400) / 200.0
-    way = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
-    position = 25.0 * t[:, None] * way + rng.normal(0.0, noise, (400, 2))
-    full = np.ones(400)
-    columns = (t, 2.0 * full, 2.0 * full, full, np.outer(full, way), 0.5 * full, position, 25.0 * full)
-    return replace(
-        ground_truth.visit(1).analyse().strokes[0],
-        curve=StrokeCurve(*columns, noise=(0.0, 0.0), quiet=0.0),
-        onset=None,
-        steady=(0.0, 1.99),
-        direction=1,
-        heading=degrees,
-        zero_drift=0.0,
-        break_away=None,
-        slide_onset=None,
-    )
+def drawn_stroke(time, normal=2.0, ratio=0.5, degrees=0.0, noise=0.0, curve=None, **changes):
+    """Return a stroke in closed form over `time` (n,) [s] at an angle to the x axis, without noise of the forces.
+
+    `normal` [N] and `ratio` [-] are numbers or courses (n,); the centre of pressure has white noise [mm].
+    """
+    full, way = np.ones(len(time)), np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
+    normal, tangential = normal * full, ratio * normal * full
+    position = 25.0 * time[:, None] * way + np.random.default_rng(0).normal(0.0, noise, (len(time), 2))
+    columns = (time, normal, normal, tangential, np.outer(tangential, way), ratio * full, position, 25.0 * full)
+    loads = {"normal_force": normal.mean(), "tangential_force": tangential.mean(), "peak_normal": normal.max()}
+    loads |= {"peak_tangential": tangential.max(), "tau_max": tangential.max() / 80.0, "contact_area": 80.0}
+    numbers = {"mu_dynamic": np.mean(ratio), "mu_max": np.max(ratio), "zero_drift": 0.0, "area_exponent": 0.0}
+    numbers |= {"direction": 1, "heading": degrees, "onset": None, "break_away": None, "slide_onset": None}
+    curve = StrokeCurve(*columns, **{"noise": (0.0, 0.0), "quiet": 0.0, **(curve or {})})
+    stroke, steady = ground_truth.visit(1).analyse().strokes[0], (time[0], time[-1])
+    return replace(stroke, curve=curve, steady=steady, **(loads | numbers | changes))
+
+
+TWO_SECONDS = np.arange(400) / 200.0
 
 
 def test_a_movement_nearly_across_leaves_its_sign_in_doubt():
-    intervals = stroke_intervals(oblique(60.0, 0.3), 0)  # as far along x as the analysis asks for
+    intervals = stroke_intervals(
+        drawn_stroke(TWO_SECONDS, degrees=60.0, noise=0.3), 0
+    )  # as far along x as the analysis asks for
     assert intervals.heading[0] < 60.0 < intervals.heading[1]
     assert 0.2 < intervals.direction_agrees < 0.8
 
 
 @pytest.mark.parametrize("degrees", [45.0, 15.0])
 def test_of_a_calibration_alone_a_heading_has_the_closed_form(degrees):
-    intervals = stroke_intervals(oblique(degrees, 0.0), 0, GAINS_ALONE)
+    intervals = stroke_intervals(drawn_stroke(TWO_SECONDS, degrees=degrees), 0, GAINS_ALONE)
     ratio = np.sqrt(2.0) * 0.02  # of the gains of two torques, of tan: d(angle) = sin(2 angle) / 2 d(log tan)
     half = np.degrees(1.95996 * ratio * np.sin(2.0 * np.radians(degrees)) / 2.0)
     assert width(intervals.heading) == pytest.approx(2.0 * half, rel=0.02)
+
+
+@pytest.mark.parametrize("rule", ["maximum", "mean"])
+def test_the_friction_of_a_repeat_is_the_ratio_of_its_forces(rule):
+    small = BootstrapSettings(gain_error=0.001, cross_talk=0.001, tilt_error=(0.05, 0.05))  # so the first order is all
+    draws = friction_draws(drawn_stroke(TWO_SECONDS, zero_drift=0.006), 0, rule, small)
+    assert draws.mu.std() > 0.001
+    assert draws.mu == pytest.approx(draws.tau_max * 80.0 / draws.normal_force, abs=0.005 * draws.mu.std())
+
+
+def test_the_mean_of_a_force_that_climbs_is_that_of_a_window_cut_at_both_ends():
+    time = np.arange(4000) / 200.0
+    stroke = drawn_stroke(time, 2.0 + 0.05 * time)
+    low, high = stroke_intervals(stroke, 0, replace(NO_ERROR, repeats=2000)).normal_force
+    # Each end moves evenly by up to a fifth of 20 s, the middle by half their difference: a triangle of ±2 s.
+    half = 0.05 * 2.0 * (1.0 - 0.05**0.5)
+    assert (low, high) == pytest.approx(
+        (stroke.normal_force - half, stroke.normal_force + half), abs=0.05 * 0.1
+    )  # a block
+
+
+def test_of_blocks_that_are_not_alike_the_interval_of_mu_is_students():
+    ratio = np.where(np.arange(800) // 20 % 2, 0.52, 0.48)  # 40 blocks of 0.1 s that alternate
+    stroke = drawn_stroke(np.arange(800) / 200.0, ratio=ratio)
+    interval = stroke_intervals(stroke, 0, replace(NO_ERROR, inwards=0.0)).mu_dynamic
+    expected = stats.t.interval(0.95, 39, 0.5, stats.sem(ratio[::20]))
+    assert interval == pytest.approx(expected, abs=0.02 * width(expected))
+
+
+def test_a_peak_that_readings_miss_lies_above_the_greatest_reading():
+    stroke = drawn_stroke(TWO_SECONDS, curve={"crests": np.ones(400), "crest_gap": 0.1})
+    intervals = stroke_intervals(stroke, 0, NO_ERROR)
+    assert intervals.peak_tangential == pytest.approx((1.0025, 1.0975), abs=0.002)
+    assert intervals.tau_max == pytest.approx((1.0025 / 80.0, 1.0975 / 80.0), rel=0.002)
+
+
+def test_noise_lowers_a_peak_by_the_greatest_of_as_many_draws():
+    curve = {"noise": (0.001, 0.002), "quiet": 1e9}  # [N]; of a zero that is known
+    intervals = stroke_intervals(drawn_stroke(TWO_SECONDS, curve=curve), 0, NO_ERROR)
+    # Filtered readings are independent every 25 ms: 80 of them. Their greatest strays about its mean, twice below.
+    greatest = stats.norm.ppf(np.array([0.025, 0.975]) ** (1 / 80))
+    mean = integrate.quad(lambda z: z * 80 * stats.norm.cdf(z) ** 79 * stats.norm.pdf(z), -8.0, 8.0)[0]
+    for interval, force, noise in ((intervals.peak_normal, 2.0, 0.002), (intervals.peak_tangential, 1.0, 0.001)):
+        assert interval == pytest.approx(force + noise * (greatest - 2.0 * mean), abs=0.05 * noise)
 
 
 def test_an_instant_that_a_person_decided_has_no_interval(strokes):

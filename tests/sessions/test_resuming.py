@@ -6,10 +6,11 @@ from datetime import datetime, timedelta
 from functools import partial
 
 import msgspec
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from killed_process import fork, kill, lines_of, read_reports, whole_session
-from recordings import change
+from recordings import change, readings
 from simulated_session import Session, resume
 from stand_ins import INFO, ResumableClock
 from walks import FORCES, steps, walks
@@ -187,6 +188,10 @@ def test_another_transducer_or_another_rate_is_refused_with_a_sentence():
         check_same_transducer(INFO, dataclasses.replace(INFO, serial="FT2"))
     with pytest.raises(RecordingError, match="gives 100 readings a second, and gave 200"):
         check_same_transducer(INFO, dataclasses.replace(INFO, rate=100.0))
+    check_same_transducer(None, None)
+    for pair in ((INFO, None), (None, INFO)):
+        with pytest.raises(RecordingError, match="began without a transducer, or is to go on without its own"):
+            check_same_transducer(*pair)
 
 
 def test_a_rate_that_can_only_be_measured_may_be_another_by_a_few_per_cent():
@@ -227,3 +232,14 @@ def test_the_seam_alters_nothing_the_device_said(tmp_path):
     assert joined.raw.tobytes() == block.raw.tobytes()
     assert joined.counter.tolist() == block.counter.tolist()
     assert joined.sequence.tolist() == [number + 1000 for number in block.sequence.tolist()]
+
+
+def test_readings_after_a_resumption_follow_those_before_by_number_and_by_the_session_clock():
+    before = readings(40, 2, received_ns=5_000_000_000)  # numbers 40 and 41, the last at 0.205 s
+    after = dataclasses.replace(readings(3, 2), received_ns=np.array([7_500_000_000, 7_600_000_000]))
+    joined = Seam.between(before, after).join(after)
+    assert joined.sequence.tolist() == [42, 43]
+    assert joined.time.tolist() == pytest.approx([0.205 + 2.5, 0.21 + 2.5])
+    assert Seam.between(before.between(0, 0), after).join(after).time.tolist() == after.time.tolist()
+    early = dataclasses.replace(after, received_ns=np.zeros(2, np.int64))  # by a clock that ran backwards
+    assert Seam.between(before, early).join(early).time[0] > before.time[1]

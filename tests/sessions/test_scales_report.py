@@ -1,12 +1,17 @@
 """What a study's page shows of choices between two and of estimates."""
 
+import math
+import re
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
-from sessions.report.tables.scales import scale_sentences, scales_table
+from sessions.report.tables.scales import psychometric_sentences, psychometric_table, scale_sentences, scales_table
 from sessions.statistics.pooled import choices, constant_stimuli, exponent
+from sessions.statistics.psychometric import Psychometric
 from sessions.statistics.scales import MODELS, Choice, consistence, paired_scale
+from sessions.statistics.scores import Average, IntervalEstimate
 
 
 def descriptor(answers, result=None):
@@ -74,3 +79,68 @@ def test_estimates_without_friction_have_no_exponent_and_say_why():
     assert "no trial has both" in result.reason
     table = SimpleNamespace(descriptor="stickiness", scales=(), consistence={}, exponent=result)
     assert scale_sentences(table)[0].startswith("Stickiness: no exponent of the estimates by µ")
+
+
+def test_the_interval_of_an_exponent_holds_the_true_one_with_and_without_errors_of_mu():
+    rng, moduli, mu = np.random.default_rng(0), (2.0, 7.0, 40.0, 11.0), {1: 0.3, 2: 0.5, 3: 0.8}
+    estimates = [
+        row(f"P{subject}", index=index, mu=friction, estimate=modulus * friction**1.5 * float(rng.lognormal(0, 0.05)))
+        for subject, modulus in enumerate(moduli)
+        for index, friction in mu.items()
+    ]
+    table = SimpleNamespace(descriptor="stickiness", scales=(), consistence={}, exponent=exponent(estimates))
+    (sentence,) = scale_sentences(table)
+    interval = r"([\d.]+) \(([\d.]+) to ([\d.]+)\)"
+    numbers = re.fullmatch(
+        f"Stickiness: if estimates are a power of µ, its exponent is {interval} with µ taken as exact, "
+        rf"{interval} with errors in both\.",
+        sentence,
+    )
+    for value, low, high in np.reshape([float(number) for number in numbers.groups()], (2, 3)):
+        assert low < value < high
+        assert low < 1.5 < high < low + 0.3
+
+
+def logs(*ratios):
+    return IntervalEstimate(*(None if ratio is None else math.log(ratio) for ratio in ratios))
+
+
+PSE = logs(1.25, 1.1, 1.5)
+
+
+@pytest.mark.parametrize(
+    ("jnd", "words"),
+    [
+        (logs(1.18, 1.1, 1.27), "18 % of it (10 to 27)"),
+        (logs(1.18, 1.1, None), "above 10 % of it"),
+        (logs(1.0, None, 1.27), "below 27 % of it"),
+        (logs(1.18, None, 1.27), "bounded on neither side"),
+    ],
+)
+def test_equal_and_just_noticeable_friction_of_one_subject_are_told_in_ratios_of_mu(jnd, words):
+    function = Psychometric(40, PSE, jnd, IntervalEstimate(0.04, None, None), rises=False)
+    equal, falling = psychometric_sentences(("friction", {"S1": function}, (None, None)))
+    assert equal == (
+        "Friction: by 40 answers the surface felt equal to the standard has 1.25 (1.10 to 1.50) times its µ; the just "
+        f"noticeable difference is {words}, with 4 % lapses."
+    )
+    assert falling == "Friction: 1 of 1 subject chose the surface of less µ more often."
+
+
+def test_means_over_subjects_are_geometric_and_stand_in_the_last_row():
+    function = Psychometric(40, PSE, logs(1.18, 1.1, 1.27), IntervalEstimate(0.04, 0.0, 0.11))
+    refusal = Psychometric(9, reason="too few")
+    pse = Average(2, math.log(1.2), 0.1, math.log(1.1), math.log(1.3))
+    low, middle, high = (math.log(math.log(ratio)) for ratio in (1.1, 1.15, 1.2))
+    results = ("friction", {"S1": function, "S2": function, "S3": refusal}, (pse, Average(2, middle, 0.1, low, high)))
+    assert psychometric_sentences(results) == [
+        "Friction: over 2 of 3 subjects the surface felt equal to the standard has 1.20 (1.10 to 1.30) times its µ; "
+        "over 2 the just noticeable difference is 15 % of it (10 to 20)."
+    ]
+    first, _, withheld, mean = psychometric_table([results]).groups[0].rows
+    assert [cell.text for cell in first[2:5]] == ["1.25", "18", "4.0"]
+    assert {cell.note for cell in withheld[2:5]} == {"too few"}
+    assert [cell.text for cell in mean[:4]] == ["geometric mean", "of 2 and 2", "1.20", "15"]
+    assert psychometric_sentences(("friction", {"S3": refusal, "S4": refusal}, (None, None))) == [
+        "Friction: no subject's answers give a psychometric function; the table says why."
+    ]
