@@ -13,7 +13,7 @@ from daq_app.qt.preferences import type_scale
 from daq_app.qt.subject_picture import Mirror
 from daq_app.qt.tokens import GRID, TARGET, px
 from daq_app.window.state import Message
-from daq_app.window.view_course import CourseView, PlanRow
+from daq_app.window.view_course import Button, CourseView, PlanRow
 from daq_app.wording import tr
 from sessions.run import steps
 
@@ -45,9 +45,9 @@ class CoursePanel(Panel):
         for index, widget in enumerate(self.buttons.values()):
             grid.addWidget(widget, index // columns, index % columns)
         self.plan.setMinimumHeight(3 * TARGET // 2)
-        entry, keep = QWidget(), button(tr("Keep  Enter"), tr("keep what was typed"), self._keep)
+        entry, self._do = QWidget(), button("", tr("do it"), self._keep)
         entry.setMinimumHeight(px(88))
-        row = hbox(keep, button(tr("Leave  Esc"), tr("leave it"), self.leave))
+        row = hbox((self._do, 1), (button(tr("Back  Esc"), tr("go back, and do nothing"), self.leave), 1))
         vbox(1, self._question, self.line, row, on=entry, spacing=GRID)
         self._bottom = stack_pages(acts, entry)
         self._timer = label("", "quiet")
@@ -82,12 +82,18 @@ class CoursePanel(Panel):
             self._send(entry.sends)
             return
         self._act = act
-        self._question_text = entry.question
-        set_text(self._question, entry.question)
+        self._name_question(entry, entry.question)
         self.line.setAccessibleName(entry.question)
         self.line.clear()
         self._bottom.setCurrentIndex(1)
         self.line.setFocus()
+
+    def _name_question(self, entry: Button, text: str) -> None:
+        """Show what is asked over the line, and on its button what Enter does."""
+        self._question_text = entry.question
+        set_text(self._question, text)
+        self._do.setText(f"{entry.label}  {tr('Enter')}")
+        self._do.setAccessibleName(entry.label)
 
     def leave(self) -> None:
         if self.asking:
@@ -99,10 +105,9 @@ class CoursePanel(Panel):
         if not text:
             set_text(self._question, tr("{asked_for} A word is enough; Esc leaves it.", asked_for=self._question_text))
             return
-        question = "" if self._view is None else self._view.buttons[self._act].question
-        if question and question != self._question_text:  # it would discard another trial than was meant
-            self._question_text = question
-            set_text(self._question, tr("The session has gone on meanwhile. {question}", question=question))
+        entry = None if self._view is None else self._view.buttons[self._act]
+        if entry and entry.question and entry.question != self._question_text:  # it would discard another trial
+            self._name_question(entry, tr("The session has gone on meanwhile. {question}", question=entry.question))
             return
         self.leave()
         self._send(MESSAGES[self._act](text))

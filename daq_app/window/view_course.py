@@ -167,7 +167,7 @@ def _undo_text(session: SessionState) -> str:
     trials = tuple(trial for trial in session.trials if trial.trial.number in session.redone)
     if not trials:
         return ""
-    return tr("Done again: {trials}. Ctrl+Z undoes that until the next stroke.", trials=_name_trials(trials))
+    return tr("To be done again: {trials}. Ctrl+Z undoes that until the next stroke.", trials=_name_trials(trials))
 
 
 def _name_trials(trials: tuple[TrialState, ...]) -> str:

@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QPushButton
 
 from daq_app.qt.preferences import settings
 from daq_app.qt.start import SIMULATED_BENCH
@@ -177,6 +177,19 @@ def test_redo_names_its_trial_on_both_buttons_and_in_its_question(driver):
     QTest.keyClick(window.subject, Qt.Key.Key_R)
     assert f"trial 1 ({code})" in window.course._question.text()
     QTest.keyClick(window.course.line, ESCAPE)
+
+
+def test_the_button_below_a_reason_says_what_enter_does(driver):
+    course, texts = driver.window.course, []
+    driver.begin(scores_only=True)
+    driver.go_on("ready")
+    for act in ("redo", "end", "note"):
+        driver.window.act(act)
+        texts += [
+            push.text() for push in course.findChildren(QPushButton) if push.isVisible() and "Enter" in push.text()
+        ]
+        QTest.keyClick(course.line, ESCAPE)
+    assert texts == ["Redo 1  Enter", "End  Enter", "Note  Enter"]
 
 
 def test_a_redo_by_mistake_is_undone_with_a_key_and_the_replay_of_the_session_agrees(driver, tmp_path):

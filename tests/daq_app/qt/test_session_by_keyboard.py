@@ -257,8 +257,8 @@ def test_a_warning_stands_beside_a_banner_and_gives_way_to_what_the_session_says
         notice.show_view(replace(banner, sentence=sentence), "", "Mount")
         assert "does not answer" in notice._label.text()
         assert notice._label.text().endswith("Close once more.")
-    notice.show_view(None, "Done again: trial 5 (K50).", "Mount")
-    assert notice._label.text() == "Done again: trial 5 (K50)."
+    notice.show_view(None, "To be done again: trial 5 (K50).", "Mount")
+    assert notice._label.text() == "To be done again: trial 5 (K50)."
 
 
 def test_numbers_on_ones_own_scale_and_practice_before_them_are_asked_for_and_kept(driver):

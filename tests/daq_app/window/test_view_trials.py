@@ -116,7 +116,7 @@ def test_a_redo_that_is_undone_brings_back_stroke_and_score_until_the_next_onset
     view = course_view(session, BenchState(), 0.0)
     undo = view.buttons["undo"]
     assert (undo.label, undo.key, undo.enabled) == ("Undo redo 1", "Ctrl+Z", True)
-    assert view.notice.startswith(f"Done again: trial 1 ({FIRST.stimulus.code}). Ctrl+Z undoes that")
+    assert view.notice.startswith(f"To be done again: trial 1 ({FIRST.stimulus.code}). Ctrl+Z undoes that")
     undone = (
         log("undo_redo", 1),
         log("take_discarded", 1, take=2, reason="the redo was undone"),
