@@ -142,7 +142,7 @@ class MainWindow(QMainWindow):
             "pilot": self._pilot,
             "preview": self._preview,
             "tablet": lambda: self.tablet and self.tablet.server.renew(),
-            "subject": self.side.show,
+            "subject": lambda: (self.side.show(), self.notice.warn("")),  # what said that it is closed goes
             "ruler": lambda: (self.side.show(), self.subject.check_ruler()),
             "open": self.rooms.choose,
             "report": lambda: (analyst := self.rooms.analyst) and analyst.write_report(),

@@ -71,7 +71,9 @@ def test_no_key_answers_on_a_page_that_was_closed_and_its_mark_waits(driver):
     for key in (Qt.Key.Key_PageUp, ENTER, SPACE):
         QTest.keyClick(window, key)
     assert (driver.session.phase, window.subject.line.answer.score) == ("scoring", 50.0)
+    assert "was closed" in window.notice._label.text()
     QTest.keyClick(window, Qt.Key.Key_F6)
+    assert window.notice._label.text() == ""
     driver.answer(on=window)
     assert driver.session.trials[0].answer == "score 50"
 
