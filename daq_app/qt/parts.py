@@ -115,6 +115,12 @@ class WrappedLabel(QLabel):
             self._least = self.fontMetrics().height() if self._keeps_room else 1
             self._fit()
 
+    def changeEvent(self, event: QEvent) -> None:
+        """Take the room that bolder words need."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.FontChange:
+            self._fit()
+
     def _fit(self) -> None:
         self.setMinimumHeight(0)  # which Qt would count among what the text needs
         height = max(self.heightForWidth(max(self.width(), 60)), self._least)

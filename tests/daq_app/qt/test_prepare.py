@@ -5,14 +5,16 @@ from pathlib import Path
 
 import pytest
 from protocol_texts import OWN
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QFileDialog, QLabel
 from qt_events import wheel
 
 from daq_app.qt.answer_fields import ChoiceOfTwo, NumberField
+from daq_app.qt.cards import CardFrame
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.recorder.messages import Connect, Disconnect
+from daq_app.window.checklist import Card
 from daq_app.window.new_session import UnfinishedSession
 from daq_app.window.state import DevicesFound, Searching
 from daq_app.window.subject import SubjectView
@@ -174,6 +176,26 @@ def test_start_brings_the_card_that_its_headline_names_into_sight(driver):
         page.folder.setText("recordings")
         page.subject.clear()
         window.resize(size)
+
+
+def test_words_that_start_makes_bold_are_read_whole(driver):
+    frame, grown = CardFrame("Subject"), []
+    message = frame.message
+    frame.show()
+    for width in range(200, 400, 20):
+        frame.resize(width, 300)
+        frame.show_card(Card("Subject", ready=False, text=f"Give a code of letters and digits, never a name: {width}"))
+        heights = []
+        for _ in range(2):
+            driver.application.processEvents()
+            room = QRect(0, 0, message.width(), 1000)
+            words = message.fontMetrics().boundingRect(room, Qt.TextFlag.TextWordWrap, message.text())
+            assert message.height() >= words.height(), width
+            heights.append(words.height())
+            frame.insist()
+        grown.append(heights[1] > heights[0])
+    frame.hide()
+    assert any(grown)
 
 
 def test_a_search_that_finds_nothing_says_so_and_what_to_do(driver):
