@@ -9,8 +9,10 @@ from finger_presses import law
 from daq_app.cli.main import run
 from daq_app.cli.verbs.fit_finger import SCENE_HEAD
 from sessions.prediction import finger_in
-from sessions.prediction.press_model import PressModel
+from sessions.prediction.finger_fit import FingerFit, Interval, LayerFit
+from sessions.prediction.press_model import LAYERS, Check, PressModel
 from sessions.recording.derived import check_replaceable
+from solver import Friction, Loading, Scene
 
 STIFFNESSES = (0.25, 0.1, 0.025)  # [MPa]
 RATE, DEEP, TOUCH = 200.0, 1.4, 3.2  # [Hz], [mm], displacement of the stage at the touch [mm]
@@ -118,3 +120,68 @@ def test_a_visit_without_forces_holds_no_press_that_can_be_fitted(presses, tmp_p
     words = ["fit-finger", str(tmp_path / "nowhere"), "--displacement", str(presses / "stage.csv")]
     assert run(words) == 1
     assert "nowhere" in capsys.readouterr().err
+
+
+@pytest.fixture
+def stub_fit(monkeypatch):
+    """A fit of these numbers, whatever was pressed; return what it was given."""
+    calls = {}
+    layers = tuple(
+        LayerFit(name, Interval(E, 0.8 * E, 1.2 * E), Interval(E, None, 2.0 * E), Interval(E, 0.5 * E, None), 0.5, "")
+        for name, E in zip(LAYERS, STIFFNESSES, strict=True)
+    )
+    scene = Scene(friction=Friction(0.0), loading=Loading(1.0))
+    outcome = FingerFit(scene, layers, Interval(0.75, 0.5, 1.0), (TOUCH,) * 3, 0.004, 0, 123, 1.25, np.zeros((2, 3)))
+
+    def model(_, prior, deep, mu, __):
+        calls.update(prior=prior, deep=deep, mu=mu)
+
+    def fit(_, presses, gain_error, seed):
+        calls.update(presses=presses, gain_error=gain_error, seed=seed)
+        return outcome
+
+    verb = "daq_app.cli.verbs.fit_finger"
+    monkeypatch.setattr(f"{verb}.press_model", model)
+    monkeypatch.setattr(f"{verb}.fit", fit)
+    monkeypatch.setattr(f"{verb}.check", lambda *_: Check(calls.get("deviation", 0.004), np.array([0.1, 0.3, 0.55])))
+    return calls
+
+
+def test_a_fit_is_printed_in_kilopascal_with_its_intervals_and_a_solver_that_differs_is_a_flaw(
+    presses, capsys, stub_fit
+):
+    words = ["fit-finger", str(presses / "session"), "--displacement", str(presses / "stage.csv")]
+    capsys.readouterr()
+    assert run([*words, "--prior", "3", "--mu", "0.4", "--seed", "5"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    rows = [line.split(maxsplit=1) for line in lines if line.startswith(LAYERS)]
+    assert {name: " ".join(cells.split()) for name, cells in rows} == {
+        "epidermis": "250 200 to 300 open to 500 125 to open 10 %",
+        "dermis": "100 80.0 to 120 open to 200 50.0 to open 30 %",
+        "fat": "25.0 20.0 to 30.0 open to 50.0 12.5 to open 55 %",
+    }
+    text = "\n".join(lines)
+    assert (
+        "0.750 of the published finger's, 95 % interval 0.500 to 1.00, from 123 points of 3 presses up to 1.25 mm"
+        in text
+    )
+    assert "agree with those fitted: by 0.4 % at most" in text
+    assert (stub_fit["prior"], stub_fit["mu"], stub_fit["seed"]) == (pytest.approx(np.log(3.0)), 0.4, 5)
+    stub_fit["deviation"] = 0.03
+    assert run(words) == 3
+    assert "DIFFER from those fitted: by 3 % at most" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("clock", "unit"), [("time_s", 1.0), ("received_ns", 1e9)])
+def test_a_log_whose_clock_is_late_is_shifted_onto_that_of_the_forces(presses, tmp_path, capsys, stub_fit, clock, unit):
+    words = ["fit-finger", str(presses / "session"), "--displacement"]
+    assert run([*words, str(presses / "stage.csv")]) == 0
+    expected = stub_fit["presses"]
+    assert len(expected) == 3
+    rows = np.loadtxt(presses / "stage.csv", delimiter=",", skiprows=1)
+    rows[:, 0] = (rows[:, 0] + 1.5) * unit
+    np.savetxt(tmp_path / "late.csv", rows, "%.6f", ",", header=f"{clock},displacement_mm", comments="")
+    assert run([*words, str(tmp_path / "late.csv"), "--shift", "-1.5"]) == 0
+    for press, same in zip(stub_fit["presses"], expected, strict=True):
+        np.testing.assert_allclose(press.force, same.force, atol=1e-9)
+    capsys.readouterr()

@@ -175,6 +175,7 @@ def test_commands_and_scene_at_the_end_of_a_report_give_its_numbers(report_dir, 
     for name in ("area", "gain_error", "scene", "bootstrap_seed"):
         assert now[name] == then[name]
     assert now["afferent"]["settings"] == then["afferent"]["settings"]
+    assert now["afferent"]["settings"]["static_gain"] == 30.0
     before, after = (json.loads((folder / "analysis.json").read_bytes()) for folder in (report_dir, tmp_path / "P01"))
     assert after["bootstrap"] == before["bootstrap"]
     assert after["bootstrap"]["settings"]["seed"] == now["bootstrap_seed"] == 7

@@ -3,12 +3,16 @@
 import csv
 import shutil
 import subprocess
-from dataclasses import fields
+from dataclasses import fields, replace
 
+import numpy as np
 import pytest
-from study_example import study
+from scipy import stats
+from study_example import INDICES, study, visit
 
 from sessions.report.pages import _MEANING, columns_csv, paths_csv, trials_csv
+from sessions.report.tables.study import study_tables
+from sessions.statistics.pooled import pool_visits
 from sessions.statistics.visit import TrialRow
 
 RSCRIPT = shutil.which("Rscript")
@@ -77,3 +81,25 @@ def test_pandas_opens_the_table_with_every_number(findings, folder):
     columns = pandas.read_csv(folder / "trials-columns.csv", keep_default_na=False)
     assert columns["column"].tolist() == table.columns.tolist()
     assert table["excluded"].notna().sum() == 5  # the five trials of the one subject left out
+
+
+def test_scipy_comes_to_the_same_geometric_means_of_magnitude_estimates():
+    rng = np.random.default_rng(4)
+    estimates = np.outer((3.0, 40.0, 11.0, 7.0), (1.0, 1.5, 2.2, 3.0, 5.0)) * rng.lognormal(0.0, 0.2, (4, 5))
+    visits = [
+        replace(v, rows=tuple(replace(row, score=None, estimate=by_index[row.index]) for row in v.rows))
+        for v, values in zip(map(visit, range(1, 5)), estimates.tolist(), strict=True)
+        for by_index in [dict(zip(INDICES, values, strict=True))]
+    ]
+    nothing = visit(5)
+    nothing = replace(nothing, rows=tuple(replace(row, score=None, estimate=0.0) for row in nothing.rows))
+    tables = study_tables(pool_visits([*visits, nothing]))
+    table = next(table for section in tables.values() for table in section if table.name == "table-estimates")
+    assert "Left out for an estimate that is not above 0: stickiness: S05." in table.caption
+    at_one_modulus = estimates / stats.gmean(estimates, axis=1)[:, None] * stats.gmean(estimates, axis=None)
+    for row, *columns in zip(table.groups[0].rows, estimates.T, at_one_modulus.T, strict=True):
+        assert row[1].text == "4"
+        for mean, ends, column in zip(row[2::2], row[3::2], columns, strict=True):
+            low, high = np.exp(stats.t.interval(0.95, 3, np.log(column).mean(), stats.sem(np.log(column))))
+            texts = [mean.text, *ends.text.split(" to ")]
+            assert [float(text) for text in texts] == pytest.approx([stats.gmean(column), low, high], rel=0.005)
