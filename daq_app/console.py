@@ -126,7 +126,7 @@ class Console:
     def progress(self, fraction: float, text: str, *, end_known: bool = True) -> None:
         """Show how far a long job is (`fraction` from 0 to 1): a bar on a terminal, else now and then a new line.
 
-        The bar tells rate and time left where the end is known. A `fraction` below the last one begins another job.
+        The bar shows rate and time left where the end is known. A `fraction` below the last one begins another job.
         """
         now = time.monotonic()
         if fraction < self._fraction:

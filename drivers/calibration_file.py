@@ -77,7 +77,7 @@ def _parse(data: bytes, name: str) -> CalibrationFile:
     transform = _transform(body)
     matrix = transform @ (_rows(axes) * (units / scale)[:, None])
     if not np.all(np.isfinite(matrix)) or np.linalg.matrix_rank(matrix) < 6:
-        raise _Unusable("its six Axis rows do not make a matrix that tells forces and torques apart")
+        raise _Unusable("its six Axis rows do not make a matrix that separates forces and torques")
     user = _by_name(body, "UserAxis")
     if len(user) == 6:
         rounding = _ROUNDING * (units[:, None] + np.abs(transform) @ (units / scale)[:, None])

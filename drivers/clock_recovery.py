@@ -248,7 +248,7 @@ _NONE = Placement(np.empty(0, np.int64), np.empty(0))
 class ScanCount:
     """Numbers and times of scans by the converter's own clock: scan k is at k / rate.
 
-    The host's clock only tells how long the converter was away, and whether a counter that tells of losses went round
+    The host's clock only shows how long the converter was away, and whether a counter of losses went round
     unseen.
     """
 

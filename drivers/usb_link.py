@@ -58,7 +58,7 @@ class UsbLink:
                 break
             except _core.USBError as error:
                 if packets:
-                    break  # the next call tells
+                    break  # the next call reports it
                 raise LinkLost(f"{self._location} is gone: {_reason(error)}") from None
             wait_ms = _PAUSE_MS
         return b"".join(packets) or None

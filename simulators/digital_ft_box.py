@@ -32,7 +32,7 @@ _BURST = ROOM // 13  # packets at one go after the computer was busy: as many as
 class DigitalFtBox(LineBox):
     """A transducer with a simulated bench behind it. Its time, and the bench's, begins when it is started.
 
-    It holds one calibration, as number 1, whose part number tells that it is simulated.
+    It holds one calibration, as number 1, whose part number says that it is simulated.
     """
 
     def __init__(

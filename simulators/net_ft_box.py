@@ -39,7 +39,7 @@ class _Stream:
 class NetFtBox(ServedBox):
     """A box on loopback, with a simulated bench behind it. Its time, and the bench's, begins when it is started.
 
-    One thread serves all its ports. It tells that it is simulated in the product name on its page.
+    One thread serves all its ports. The product name on its page says that it is simulated.
     """
 
     def __init__(

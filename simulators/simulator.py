@@ -116,7 +116,7 @@ class PseudoTerminal:
 
 
 def stopwatch(clock: Clock) -> Callable[[], float]:
-    """Return what tells the time [s] of a clock since now."""
+    """Return a function that returns the time [s] of a clock since now."""
     origin_ns = clock.now_ns()
     return lambda: (clock.now_ns() - origin_ns) * 1e-9
 
@@ -227,7 +227,7 @@ class Simulator:
     name: str  # of the driver that reads it
     start: Start
     factor: float  # times as fast as real it can run on a computer that has much else to do
-    tells: tuple[Kind, ...] = LINE_FAULTS  # faults that can happen on this wire and that a driver can tell
+    tells: tuple[Kind, ...] = LINE_FAULTS  # faults that can happen on this wire and that a driver can notice
     hides: tuple[Kind, ...] = ("stall",)  # faults that can happen and that no driver can tell
     statuses: tuple[int, ...] = ()  # that its maker's manual lists, to be set one after the other
     unshown: float = 0.0  # share of damaged records that no check on this wire shows

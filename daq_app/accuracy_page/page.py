@@ -205,7 +205,7 @@ _TABLES: tuple[Callable[[RunResults], Table], ...] = (
     _table_maker(
         "costs", Cost,
         "Where the time of one surface goes, asked for with a tolerance: in all, from scene to answer. Set-up, solve "
-        "and estimate are of the mesh that the answer is from, as it tells itself; parts: shares of all, by a "
+        "and estimate are of the mesh that the answer is from, as it states itself; parts: shares of all, by a "
         "profiler.",
         {
             "": lambda row: f"{row.kinematics} strain", "tolerance": lambda row: percent(row.tolerance),

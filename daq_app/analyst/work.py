@@ -320,7 +320,7 @@ class NothingToShow(Exception):
 def _open_recording(folder: Path) -> Recording:
     recording = reveal(Recording.open(folder))
     if recording.plan.blinded:
-        raise Blinded(f"{folder} is blinded: its results are told by index; 'daq-app unblind' opens the key")
+        raise Blinded(f"{folder} is blinded: its results are shown by index; 'daq-app unblind' opens the key")
     return recording
 
 

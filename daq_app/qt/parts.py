@@ -289,7 +289,7 @@ def regrade(widget: QWidget, value: str, property_name: str = "grade") -> None:
 
 
 def set_text(widget: QLabel, text: str, name: str = "", grade: str | None = None) -> None:
-    """Show a text. A screen reader says it after the `name` of what it tells; without a name the text alone."""
+    """Show a text. A screen reader says it after the `name` of what it shows; without a name the text alone."""
     widget.setText(breakable(text) if widget.wordWrap() else text)  # Qt itself does nothing where it is the same
     if name:
         widget.setAccessibleName(f"{name} {text or tr('nothing')}")

@@ -273,7 +273,7 @@ def _helper(prepared: SessionSetup, bench: Bench) -> Operator | None:
 
 
 def _surface_of(people: m.People, plan: SessionPlan, folder: Path) -> SurfaceOf:
-    """Return what tells a simulated bench the surface of a trial: where codes are blinded, by the study's key."""
+    """Return a function from a trial to its simulated surface; where codes are blinded, by the study's key."""
     try:
         key = study_key(folder.parent) if plan.blinded else None
     except StudyError as error:

@@ -293,7 +293,7 @@ def population_relations(
 ) -> dict[str, dict[str, float]]:
     """Return the relation for each descriptor with the SEDs of the published finger, which simulated people have.
 
-    None where a law of the area tells another tau_max than the true one, and none at finite strain, where most
+    None where a law of the area gives another tau_max than the true one, and none at finite strain, where most
     sticky surfaces have no settled slide.
     """
     if options.kinematics == "finite" or area != FIXED:

@@ -82,7 +82,7 @@ class _Model:
 class Follower:
     """Follows one finger, batch by batch; holds the steppers' states and the last minute of predictions.
 
-    Small strain is always followed. Where finite strain is asked for it tells instead, as far as it reaches.
+    Small strain is always followed. Where finite strain is asked for, its values are shown as far as it has any.
     """
 
     def __init__(self, use: Use) -> None:

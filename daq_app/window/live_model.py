@@ -70,7 +70,7 @@ class Provisional:
     depth: float  # of the bone, below first touch [mm]
     mu: float  # taken so far [-]
     kinematics: Kinematics  # that is asked for
-    instead: Mask  # (n,) where small strain tells, the forces being beyond the reach of finite strain
+    instead: Mask  # (n,) whose values are of small strain, the forces being too large for finite strain
     received_ns: int
     stream: int
 

@@ -1,8 +1,8 @@
 """A session as a data set of the Brain Imaging Data Structure: behaviour, events, forces, and what was made of them.
 
-Behavioural experiments (`beh`) as BIDS 1.10 tells them. Forces and torques have no data type of their own there yet, so
-the readings are a continuous recording (`physio`), one file for each stretch without a break; a reading that never
-arrived is a row of n/a, so that row and sampling rate agree. The last column tells of a simulation.
+Behavioural experiments (`beh`) as BIDS 1.10 describes them. Forces and torques have no data type of their own there
+yet, so the readings are a continuous recording (`physio`), one file for each stretch without a break. A reading that
+never arrived is a row of n/a, so that row and sampling rate agree. The last column says whether data are simulated.
 """
 
 import gzip

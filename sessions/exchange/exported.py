@@ -37,7 +37,7 @@ class Head:
     transducer: Mapping[str, Any] | None
     provenance: Mapping[str, Any]
     losses: tuple[str, ...]  # of the session that was exported
-    digest: Digest | None  # None where the export tells none
+    digest: Digest | None  # None where the export has none
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ def side_files(folder: Path) -> dict[str, bytes]:
 
 
 def head_of(description: Mapping[str, Any]) -> Head:
-    """Return the head that a `session.json` tells. Raises ValueError where it is none of ours, or a later one."""
+    """Return the head that a `session.json` holds. Raises ValueError where it is none of ours, or a later one."""
     check_format(description.get("format"))
     digests = description["sha256"]
     return Head(

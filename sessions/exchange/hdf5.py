@@ -1,4 +1,4 @@
-"""A session as one HDF5 file: the sealed copy, which tells of itself, and the tables made from it."""
+"""A session as one HDF5 file: the sealed copy, which describes itself, and the tables made from it."""
 
 # h5py brings no types; every array is given its type where it leaves this file.
 

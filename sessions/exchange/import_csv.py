@@ -208,7 +208,7 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
             f"unit in the header ({', '.join(TIME_UNITS)}), or give a higher --rate"
         )
     position = np.arange(len(time), dtype=np.int64)
-    received = np.rint(time * 1e9).astype(np.int64)  # the file tells no other instant
+    received = np.rint(time * 1e9).astype(np.int64)  # the file holds no other instant
     block = ReadingBlock(position, position, np.zeros(len(time), np.int64), time, received, rows[:, list(layout.axes)])
     clock = StillClock(int(block.received_ns[-1]))
     source = {

@@ -1,6 +1,6 @@
 """A study: one protocol, its rows, who is enrolled in which, and the folder with its SQLite file and sealed key.
 
-What happened in a study, in order, tells all. Several programs may enrol at once: each change is one transaction
+A study is the list of what happened in it, in order. Several programs may enrol at once: each change is one transaction
 that begins by taking the file for itself.
 """
 

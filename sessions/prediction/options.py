@@ -80,7 +80,7 @@ def finger_in(path: Path) -> tuple[Scene, str]:
     keys += [f"solve.{name}" for name in _OF_OPTIONS if name in document.get("solve", {})]
     not_taken = ("title", *_OF_TRIALS, *(f"solve.{name}" for name in _OF_OPTIONS))
     if all(name.startswith(not_taken) for name, _ in leaves(document)):
-        raise SettingsError(f"{path} tells nothing of a finger; give it [finger] or [materials], or name no file")
+        raise SettingsError(f"{path} says nothing of a finger; give it [finger] or [materials], or name no file")
     if not keys:
         return scene, ""
     verb = "is" if len(keys) == 1 else "are"

@@ -80,7 +80,7 @@ def _contradictions(recording: Recording) -> Iterator[str]:
     """Yield a sentence for each part of `session.json` that differs from the live file."""
     path = recording.folder / DESCRIPTION_FILE
     if not path.is_file():
-        return  # the manifest tells
+        return  # the manifest says so
     try:
         stored = json_value(read_within_limit(path))
     except (OSError, ValueError) as error:

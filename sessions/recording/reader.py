@@ -104,7 +104,7 @@ class Recording:
 
     @property
     def end(self) -> Mapping[str, Any] | None:
-        """Return what the end of the session tells; None where it was cut short, or is still running."""
+        """Return what was recorded at the end of the session; None where it was cut short, or is still running."""
         return _end(self.events)
 
     @cached_property
@@ -122,7 +122,7 @@ class Recording:
 
     @property
     def flaws(self) -> tuple[str, ...]:
-        """Name what went wrong while recording, as the event log tells it, a sentence each."""
+        """Name what went wrong while recording, as the event log has it, a sentence each."""
         losses = [event for event in self.events if event.kind == "losses"]
         health = health_of(losses)
         counts = ((sentence, getattr(health, name)) for name, sentence in LOSS_SENTENCES.items())
@@ -218,7 +218,7 @@ def _copy_of(folder: Path) -> str:
 
 
 def _end(events: Sequence[LoggedEvent]) -> Mapping[str, Any] | None:
-    """Return what the last `ended` tells, unless the session was resumed after it."""
+    """Return the data of the last `ended`, unless the session was resumed after it."""
     last_end = next((event for event in reversed(events) if event.kind in ("ended", "resumed")), None)
     return None if last_end is None or last_end.kind == "resumed" else last_end.data
 

@@ -94,7 +94,7 @@ def _next_data(log: BinaryIO, position: int) -> int:
     """Return where the file holds data again at or after `position`, where the system can tell holes from data."""
     try:
         return os.lseek(log.fileno(), position, os.SEEK_DATA)
-    except (OSError, AttributeError) as none:  # no data up to the end; or no system that tells
+    except (OSError, AttributeError) as none:  # no data up to the end; or the system does not say
         at_end = isinstance(none, OSError) and none.errno == errno.ENXIO
         return log.seek(0, os.SEEK_END) if at_end else position
 
@@ -122,7 +122,7 @@ def torn_log(path: Path) -> Iterator[str]:
         )
 
 
-Identity = tuple[int, int] | None  # device and inode, as `os.stat` tells; None where there is no such file
+Identity = tuple[int, int] | None  # device and inode, as `os.stat` returns them; None where there is no such file
 FILE_SUFFIXES = ("", "-wal")  # the live file, and its log, which holds the newest commits
 
 

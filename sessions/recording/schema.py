@@ -1,6 +1,6 @@
 """The live store: one SQLite file a session. Its tables, their meaning, its version, and its check sums.
 
-`docs/session-format.md` tells the same to someone without this program; keep the two together.
+`docs/session-format.md` says the same to someone without this program; keep the two together.
 """
 
 import zlib

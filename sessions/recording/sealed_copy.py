@@ -1,6 +1,6 @@
 """The HDF5 copy of a recording: what it holds, how it is written, and whether it equals the live file.
 
-`docs/session-format.md` tells each data set and unit to someone without this program; keep the two together.
+`docs/session-format.md` describes each data set and unit for someone without this program; keep the two together.
 """
 
 # h5py brings no types; every array is given its type where it leaves this file.
@@ -31,7 +31,7 @@ ENDS_SUFFIX = "_end"  # of the name of the data set that holds where each text e
 
 
 class _Disk(io.RawIOBase):
-    """Takes what HDF5 writes, and keeps the first failure: told of it, the library leaves a file it cannot close."""
+    """Takes what HDF5 writes, and keeps the first failure: raised at once, it would leave an open file."""
 
     def __init__(self, path: Path) -> None:
         self.failure: OSError | None = None
@@ -180,7 +180,7 @@ def write_copy(
 
 
 def differences(recording: Recording) -> Iterator[str]:
-    """Yield a sentence for each way in which the copy differs from the live file; of no copy the manifest tells."""
+    """Yield a sentence for each way in which the copy differs from the live file; a missing copy is the manifest's."""
     if not (recording.folder / SEALED_FILE).is_file():
         return
     try:

@@ -151,7 +151,7 @@ def sync_folder_above(path: PurePath) -> str | None:
 
 
 def linux_mounts(table: str) -> tuple[Mount, ...]:
-    """Return what /proc/self/mounts tells; blanks in names are written as octal numbers there."""
+    """Return the mounts of /proc/self/mounts; blanks in names are written as octal numbers there."""
     mounts: list[Mount] = []
     for line in table.splitlines():
         fields = (re.sub(r"\\([0-7]{3})", lambda octal: chr(int(octal[1], 8)), text) for text in line.split()[:3])
@@ -161,7 +161,7 @@ def linux_mounts(table: str) -> tuple[Mount, ...]:
 
 
 def mac_mounts(table: str) -> tuple[Mount, ...]:
-    """Return what the command mount tells on macOS: `SOURCE on PLACE (KIND, ...)`."""
+    """Return the mounts that the command mount lists on macOS: `SOURCE on PLACE (KIND, ...)`."""
     lines = re.findall(r"^(.*) on (/.*) \(([^,)]+)", table, re.MULTILINE)
     return tuple(Mount(kind, PurePath(path), source) for source, path, kind in lines)
 

@@ -199,7 +199,7 @@ class SessionWriter:
         """Make all that was handed over safe, and say how much that is now.
 
         What was written is safe only in a file that can be found: where its name is gone or names another file, all of
-        it is written to a new folder, which is `folder` from then on, and `must_end` tells. Raises RecordingError.
+        it is written to a new folder, which is `folder` from then on, and `must_end` is set. Raises RecordingError.
         """
         self._check()
         now_ns = self.clock.now_ns()

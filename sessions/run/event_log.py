@@ -33,7 +33,7 @@ def data_of(event: steps.Event) -> dict[str, Any]:
 
 
 def event_of(entry: LoggedEvent) -> steps.Event | None:
-    """Return the event that was logged; None for a line that tells of a command, or of the recording itself.
+    """Return the event that was logged; None for a line about a command, or about the recording itself.
 
     Raises ValueError where the line does not hold what such an event has.
     """

@@ -130,7 +130,7 @@ class _CutShort(RecordingError):
 
 
 class _ReplayedError(Exception):
-    """An error of the program that the recording tells of, raised where it was raised."""
+    """An error of the program that was recorded, raised again where it was raised."""
 
 
 class _RecordedClock(StillClock):
@@ -267,7 +267,7 @@ class _Player:
         return remaining_s > SLICE
 
     def _move_past(self, kind: str, step: Step, interval: float) -> None:
-        """Go on to the step, and so far that the runner, which tells such things now and then, tells it once more."""
+        """Go on to the step, and so far that the runner, which reports such things now and then, repeats it."""
         last_ns = self._said_ns.get(kind)
         instant = step.instant_ns if last_ns is None else max(step.instant_ns, last_ns + round(interval * 1e9))
         self.clock.move(instant)
@@ -275,7 +275,7 @@ class _Player:
 
 
 def recorded_settings(log: Sequence[LoggedEvent]) -> RunnerSettings:
-    """Return how a session, or a part of it, was run, as its log tells; what it does not tell is as it is now."""
+    """Return how a session, or a part of it, was run, as its log says; what the log lacks is as it is now."""
     for event in log:
         if event.kind in ("started", "resumed"):
             settings = event.data["settings"] if event.kind == "started" else event.data["run"]

@@ -125,7 +125,7 @@ class ContinuedClock:
 def continue_clock(
     recording: Recording, last_block: ReadingBlock, clock: Clock, date: datetime
 ) -> tuple[ContinuedClock, dict[str, Any]]:
-    """Return a clock that continues the session's, and what the event `resumed` tells of the gap between.
+    """Return a clock that continues the session's, and what the event `resumed` records of the gap between.
 
     `last_block` holds the last readings (or none). The session clock goes on from its last instant by as much as the
     wall clock, now at `date`, says has passed, a second more or less: no two clocks of a computer survive its restart.

@@ -183,7 +183,7 @@ class _Run:
             self.clock.sleep(max(self.settings.tick - (self.clock.now_ns() - began_ns) * 1e-9, 0.0))
 
     def _listen(self) -> None:
-        """Record what the transducer gives, and let the machine know what it tells."""
+        """Record what the transducer gives, and pass on what it shows to the machine."""
         if self.transducer is None:
             self.writer.readings(ReadingBlock.empty())  # the disk is asked every second all the same
             return

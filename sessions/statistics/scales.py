@@ -144,7 +144,7 @@ def _no_scale(counts: Array, indices: Sequence[int]) -> str:
         names = ", ".join(str(index) for index, group in zip(indices, label, strict=True) if group == unbeaten)
         return f"no other surface was ever preferred to {names}, so their distance has no bound"
     if np.linalg.matrix_rank(_design(len(indices))[meetings > 0]) < len(indices):
-        return "preference and order cannot be told apart: some pairs must be met in both orders"
+        return "preference and order cannot be separated: some pairs must be met in both orders"
     return ""
 
 

@@ -198,7 +198,7 @@ def _starting_solution(scene: Scene, sizing: Sizing, below: MeshSolution, meshes
 def solve_nested(
     scene: Scene, top: MeshSolution, steps: Steps | None, meshes: Meshes
 ) -> tuple[NestedState | NotConverged, Steps | None]:
-    """Return the state of a scene on the nested mesh of `top`, or why it tells no error, and its load steps.
+    """Return the state of a scene on the nested mesh of `top`, or why it gives no error, and its load steps.
 
     `steps` are the load steps taken where the state depends on its load path. Raises Cancelled.
     """

@@ -111,7 +111,7 @@ def test_a_finger_alone_does_for_a_scene_and_what_is_not_taken_is_said(tmp_path)
 )
 def test_a_scene_file_that_tells_nothing_of_a_finger_is_refused_where_one_is_wanted(tmp_path, text):
     (tmp_path / "mine.toml").write_text(text)
-    with pytest.raises(SettingsError, match=r"mine\.toml tells nothing of a finger; give it \[finger\]"):
+    with pytest.raises(SettingsError, match=r"mine\.toml says nothing of a finger; give it \[finger\]"):
         finger_in(tmp_path / "mine.toml")
 
 

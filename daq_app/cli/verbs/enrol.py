@@ -52,7 +52,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         member = studies.enrol(folder, options.subject, body)
     if options.labels is not None:
         _write_labels(folder, options.labels)
-        console.note(f"{options.labels} tells which stimulus bears which code: it is for whoever puts the labels on")
+        console.note(f"{options.labels} says which stimulus bears which code: it is for whoever puts the labels on")
     _show(studies.open_study(folder), member, console)
     return DONE
 

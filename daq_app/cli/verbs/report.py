@@ -51,7 +51,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         raise WrongValue(f"--scores {twice} is not allowed: its scores are in the report already")
     for visit in (recording, *score_only):
         if visit.plan.blinded:
-            raise Blinded(f"{visit.folder} is blinded: a report tells scores by index; 'daq-app unblind' opens the key")
+            raise Blinded(f"{visit.folder} is blinded: a report shows scores by index; 'daq-app unblind' opens the key")
     for visit in score_only[: len(options.scores)]:
         _check_scores(visit, recording)
     from sessions.report import pages

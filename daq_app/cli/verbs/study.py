@@ -51,8 +51,8 @@ def add_power(parser: argparse.ArgumentParser) -> None:
     defaults = ", ".join(f"{field.name}={field.default:g}" for field in fields(AssumedEffects))
     meaning = f"how many subjects and surfaces a study needs, by simulation; what it assumes may be set: {defaults}"
     parser.add_argument("--power", nargs="*", metavar="NAME=VALUE", help=meaning)
-    meaning = "with --power: how often a study whose subjects press each surface to these depths tells --quantity from"
-    meaning += " its rivals; some minutes"
+    meaning = "with --power: how often a study whose subjects press each surface to these depths separates --quantity"
+    meaning += " from its rivals; some minutes"
     parse = number_in_range("--depths", float, 0.5, 3.0)
     parser.add_argument("--depths", nargs="+", type=parse, metavar="MM", help=meaning)
     add_number(parser, "--studies", int, (20, 100_000), "with --power: simulated per design (400)", 400, "N")
@@ -84,7 +84,7 @@ def print_power(options: argparse.Namespace, console: Console) -> int:
     if recoveries:
         _print_recovery(recoveries, options, console)
     else:
-        console.say("--depths 1.25 1.75 2.25 simulates how often such a study tells which quantity its scores follow.")
+        console.say("--depths 1.25 1.75 2.25 simulates how often such a study finds the quantity that scores follow.")
     return DONE
 
 
