@@ -1,5 +1,6 @@
 """'daq-app solve' at the command line: what it prints, for scripts and for people, and how it is stopped."""
 
+import re
 from contextlib import contextmanager
 
 import pytest
@@ -7,6 +8,7 @@ from examples import SCENE
 from json_answer import answer
 
 from daq_app.cli.main import run
+from solver import Friction, Loading, Scene
 from solver.accuracy import adaptivity
 
 
@@ -19,6 +21,12 @@ def test_solve_prints_what_the_contract_names(tmp_path, capsys):
     assert {*names.split(), "wall_s", "setup_s", "row", "model", "audits"} <= set(document)
     assert document["tangential_force"] > 0
     assert document["normal_force"] > 0
+    depth = Scene(friction=Friction(0.24), loading=Loading(1.5)).receptor.depth
+    assert run(["solve", str(scene), "--row", str(depth), "--json"]) == 0
+    row = answer(capsys)["row_at"]  # at the depth of the receptor's own row
+    assert row["depth"] == depth
+    assert row["arc"] == document["row"]["arc"]
+    assert row["sed"] == pytest.approx(document["row"]["sed"], rel=1e-9)
 
 
 def test_solve_tells_people_the_error_of_each_force_and_what_was_left_out(tmp_path, capsys):
@@ -29,6 +37,17 @@ def test_solve_tells_people_the_error_of_each_force_and_what_was_left_out(tmp_pa
     for quantity in ("normal force", "tangential force", "SED at the ending"):
         assert next(line for line in output.splitlines() if line.startswith(quantity)).endswith(" %")
     assert {"bone compliance", "viscosity", "the third dimension"} <= {s[:19].strip() for s in output.splitlines()}
+    assert run(["solve", str(scene), "--json"]) == 0
+    document = answer(capsys)
+    cells = [re.split(r"\s{2,}", line.strip()) for line in output.splitlines()]
+    numbers = {row[0]: (float(row[1]), row[2]) for row in cells if len(row) > 2 and re.fullmatch(r"[\d.]+", row[1])}
+    for label, name, factor, unit in (
+        ("SED at the point", "sed_point", 1e3, "kPa"),
+        ("normal force", "normal_force", 1.0, "N/mm"),
+        ("contact width", "contact_width", 1.0, "mm"),
+        ("indentation", "indentation", 1.0, "mm"),
+    ):
+        assert numbers[label] == (pytest.approx(factor * document[name], rel=0.005), unit)
 
 
 def test_solve_tells_people_stresses_in_kilopascal_at_the_ending_along_the_row_and_over_the_course(tmp_path, capsys):

@@ -1,11 +1,14 @@
 import dataclasses
 import math
 import re
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from recordings import PLAN, TRIAL
 from report_session import record
 from stand_ins import CALIBRATION, INFO
 
@@ -13,9 +16,11 @@ from drivers.clock import SimulatedClock
 from drivers.readings import ReadingBlock
 from sessions.plan.plan import Frame, SessionPlan
 from sessions.prediction import PredictionOptions, predict
-from sessions.recording import Recording, SessionWriter, provenance
+from sessions.recording import LoggedEvent, Recording, SessionWriter, provenance
+from sessions.recording.log import trial_records
 from sessions.report import Further, findings
 from sessions.report.contents import GroundTruth
+from sessions.report.facts import exclusion_sentences, remarks
 from sessions.report.figures.relation import relation_panel
 from sessions.report.pages import page
 from sessions.report.prose import summary
@@ -303,6 +308,33 @@ def test_one_stroke_without_friction_is_one_stroke_and_several_are_strokes(tmp_p
     recording = record_foreign(tmp_path / "light", press=0.2)
     excluded = findings(recording, analyse(recording)).excluded
     assert any(sentence.startswith("No dynamic friction is given for strokes 1, 2:") for sentence in excluded)
+
+
+def test_what_became_of_each_trial_that_does_not_count_is_told():
+    line, choice = TRIAL, replace(TRIAL, answer="choice")
+    trials = tuple(replace(trial, number=n) for n, trial in enumerate((line, line, choice, line, line), 1))
+    plan = replace(PLAN, blocks=(replace(PLAN.blocks[0], trials=trials),))
+    log = [
+        *(("take_started", 1, {"take": 1}), ("take_discarded", 1, {"take": 1, "reason": "the finger slipped off"})),
+        *(("take_started", 1, {"take": 2}), ("scored", 1, {"score": 40.0}), ("take_kept", 1, {"take": 2})),
+        *(("take_started", 2, {"take": 1}), ("scored", 2, {"score": None}), ("take_kept", 2, {"take": 1})),
+        *(("take_started", 3, {"take": 1}), ("chosen", 3, {"choice": None}), ("take_kept", 3, {"take": 1})),
+        *(("skip", 4, {}), ("take_started", 5, {"take": 1})),
+    ]
+    events = [LoggedEvent(n, n, kind, trial, 0, data) for n, (kind, trial, data) in enumerate(log, 1)]
+    recording = SimpleNamespace(trials=trial_records(plan, events), losses=("block 4 is damaged",))
+    analysis = SimpleNamespace(decisions=())
+    assert exclusion_sentences(recording, analysis, ()) == (
+        "Take 1 of trial 1 does not count (discarded: the finger slipped off); its readings are kept.",
+        "Trial 4 was skipped.",
+        "Take 1 of trial 5 does not count (the recording ended in it); its readings are kept.",
+    )
+    assert remarks(recording, analysis, ()) == (
+        "Lost: block 4 is damaged.",
+        "Trial 2 has no score: the subject did not answer.",
+        "Trial 3 has no answer: the subject did not answer.",
+        "Trial 5 was not done: the session ended before.",
+    )
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=5000))
