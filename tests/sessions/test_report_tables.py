@@ -1,14 +1,17 @@
 """Numbers in the tables of a report, worked out by hand from what was found."""
 
+import itertools
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
-from report_example import example
+from report_example import TABLES, example
+from scipy import stats
 
 from sessions.report.contents import GroundTruth
 from sessions.report.tables.predictions import afferent_table, direction_table, force_table, prediction_table
-from sessions.report.tables.session import ground_truth_table
+from sessions.report.tables.session import answer_tables, ground_truth_table, relation_table, score_table
 
 
 @pytest.fixture(scope="module")
@@ -85,3 +88,45 @@ def test_an_estimate_is_off_by_its_share_of_the_true_number(report):
     (row,) = ground_truth_table(replace(report, ground_truth=(truth,))).groups[0].rows
     assert [row[n].text for n in (4, 7, 10, 11)] == ["+25.0", "−20.0", "0.0", "wrong"]
     assert numbers(row[3].interval) == pytest.approx(first.bootstrap["mu_max"], abs=5e-4)
+
+
+def test_scipy_comes_to_the_same_mean_scores_of_the_answers(report):
+    tables = answer_tables(report)
+    for experiment, table, group in zip(report.experiments, tables, score_table(report).groups, strict=True):
+        answers = np.array([*experiment.answers.values()], dtype=float)  # (subjects, indices)
+        assert [row[0].text for row in table.groups[0].rows] == [*experiment.answers]
+        assert [column.name for column in table.columns[1:]] == [f"index {index}" for index in experiment.indices]
+        cells = [[float(cell.text) for cell in row[1:]] for row in table.groups[0].rows]
+        np.testing.assert_allclose(cells, answers, atol=0.051)
+        n = len(answers)
+        for row, index, column in zip(group.rows, experiment.indices, answers.T, strict=True):
+            assert [row[0].text, row[1].text] == [str(index), str(n)]
+            sd = column.std(ddof=1)
+            ends = np.clip(stats.t.interval(0.95, n - 1, column.mean(), stats.sem(column)), 0.0, 100.0)  # of the line
+            assert numbers(row[2].text + " " + row[3].text) == pytest.approx([column.mean(), *ends], abs=0.051)
+            sd_ends = sd * ((n - 1) / stats.chi2.ppf([0.975, 0.025], n - 1)) ** 0.5
+            assert numbers(row[4].text + " " + row[4].interval) == pytest.approx([sd, *sd_ends], abs=0.051)
+
+
+def test_scipy_comes_to_the_same_relation_of_prediction_and_mean_score(report):
+    for experiment, group in zip(report.experiments, relation_table(report).groups, strict=True):
+        sed = [TABLES[experiment.descriptor][index][3] for index in experiment.indices]  # [MPa]
+        means = np.array([*experiment.answers.values()], dtype=float).mean(axis=0)
+        rows = {row[0].text: row[1:] for row in group.rows}
+        for name, x in (("mean score", means), ("index", np.array(experiment.indices, dtype=float))):
+            n, r, ends, rho, _, p, slope, without = rows[name]
+            pearson, spearman = stats.pearsonr(x, sed), stats.spearmanr(x, sed)
+            assert n.text == str(len(sed))
+            assert numbers(r.text + ends.text) == pytest.approx(
+                [pearson.statistic, *pearson.confidence_interval(0.95)], abs=0.0051
+            )
+            assert numbers(rho.text) == pytest.approx([spearman.statistic], abs=0.0051)
+            orders = [stats.spearmanr(order, sed).statistic for order in itertools.permutations(x)]
+            exact = np.mean(np.abs(orders) > abs(spearman.statistic) - 1e-9)
+            assert numbers(p.text) == pytest.approx([exact], abs=0.0051)
+            assert numbers(slope.text) == pytest.approx([1e6 * stats.linregress(x, sed).slope], rel=0.0051)  # [Pa]
+            remaining = [stats.pearsonr(np.delete(x, i), np.delete(sed, i)).statistic for i in range(len(sed))]
+            labels = [int(part.split(":")[0]) for part in without.text.split(", ")]
+            assert labels == list(experiment.indices)
+            values = [numbers(part.split(":")[1])[0] for part in without.text.split(", ")]
+            assert values == pytest.approx(remaining, abs=0.0051)

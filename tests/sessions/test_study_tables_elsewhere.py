@@ -1,6 +1,7 @@
 """The study's table opened by other programs: R and pandas read the same numbers, and R comes to the same result."""
 
 import csv
+import re
 import shutil
 import subprocess
 from dataclasses import fields, replace
@@ -103,3 +104,64 @@ def test_scipy_comes_to_the_same_geometric_means_of_magnitude_estimates():
             low, high = np.exp(stats.t.interval(0.95, 3, np.log(column).mean(), stats.sem(np.log(column))))
             texts = [mean.text, *ends.text.split(" to ")]
             assert [float(text) for text in texts] == pytest.approx([stats.gmean(column), low, high], rel=0.005)
+
+
+def test_the_page_s_table_of_trials_has_the_numbers_of_the_visits_in_its_units(findings):
+    tables = study_tables(findings)
+    table = next(table for section in tables.values() for table in section if table.name == "table-trials")
+    units = {"mu": 1.0, "tau_max": 1e3, "normal_force": 1.0, "speed": 1.0, "sed": 1e3}
+    rows = [row for visit in findings.visits for row in visit.rows]
+    cells = [row for group in table.groups for row in group.rows]
+    for row, (trial, index, score, *numbers, error, flaws) in zip(rows, cells, strict=True):
+        assert [trial.text, index.text] == [str(row.trial), str(row.index)]
+        assert float(score.text) == pytest.approx(row.score, abs=0.051)
+        assert float(error.text) == pytest.approx(100 * row.error_estimate)
+        assert flaws.text == (", ".join(row.flaws).replace("_", " ") or "none")
+        for (name, factor), cell in zip(units.items(), numbers, strict=True):
+            expected = [factor * getattr(row, f"{name}{end}") for end in ("", "_low", "_high")]
+            texts = [cell.text, *cell.interval.split(" to ")]
+            assert [float(text) for text in texts] == pytest.approx(expected, rel=0.005)
+
+
+def figures(cell):
+    """Return the numbers in a cell and in the interval under it."""
+    text = f"{cell.text} {cell.interval}".replace("−", "-")
+    return [float(number) for number in re.findall(r"-?[\d.]+", text)]
+
+
+def mean_and_interval(values):
+    return [values.mean(), *stats.t.interval(0.95, len(values) - 1, values.mean(), stats.sem(values))]
+
+
+def test_pandas_and_scipy_come_to_the_page_s_means_of_surfaces_and_differences_of_scores(findings, folder):
+    pandas = pytest.importorskip("pandas")
+    trials = pandas.read_csv(folder / "trials.csv")
+    counted = trials[trials["excluded"].isna()]
+    tables = {table.name: table for section in study_tables(findings).values() for table in section}
+    lines = {name: {row[0].text: row[1:] for row in table.groups[0].rows} for name, table in tables.items()}
+    scores = counted.pivot_table(index="subject", columns="index", values="score")
+    level = scores.sub(scores.mean(axis=1), axis=0) + scores.stack().mean()
+    surfaces = scores.shape[1]
+    for index, rows in counted.groupby("index"):
+        n, mean, interval, within, sd = lines["table-scores"][str(index)]
+        assert n.text == str(len(rows))
+        assert figures(mean) + figures(interval) == pytest.approx(mean_and_interval(rows["score"]), abs=0.051)
+        assert figures(sd)[0] == pytest.approx(rows["score"].std(), abs=0.051)
+        # Without the subjects' own levels (Cousineau 2005), by the correction of Morey (2008).
+        half = stats.t.ppf(0.975, len(rows) - 1) * stats.sem(level[index]) * (surfaces / (surfaces - 1)) ** 0.5
+        assert figures(within) == pytest.approx([rows["score"].mean() - half, rows["score"].mean() + half], abs=0.051)
+        _, *cells = lines["table-surfaces"][str(index)]
+        assert figures(cells[0]) + figures(cells[1]) == pytest.approx(mean_and_interval(rows["mu"]), abs=5.1e-4)
+        sed = 1e3 * rows["sed_MPa"]
+        assert figures(cells[2]) + figures(cells[3]) == pytest.approx(mean_and_interval(sed), abs=5.1e-4)
+        assert figures(cells[4])[0] == pytest.approx(sed.std(), rel=0.051)
+        _, *cells = lines["table-forces"][str(index)]
+        for n, name in enumerate(("normal_force_N", "model_normal_force_N", "matching_depth_mm")):
+            expected = mean_and_interval(rows[name])
+            assert figures(cells[2 * n]) + figures(cells[2 * n + 1]) == pytest.approx(expected, abs=0.0051)
+    for name, (n, difference, interval, *_) in lines["table-differences"].items():
+        high, low = (scores[int(index)] for index in name.split(" − "))
+        test = stats.ttest_rel(high, low)
+        assert n.text == str(len(scores))
+        expected = [(high - low).mean(), *test.confidence_interval(0.95)]
+        assert figures(difference) + figures(interval) == pytest.approx(expected, abs=0.051)
