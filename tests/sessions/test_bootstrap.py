@@ -9,7 +9,13 @@ import test_ground_truth as ground_truth
 from closed_form import GAINS_ALONE, PLAIN, T, analyse, block, noisy
 from scipy import integrate, stats
 
-from sessions.strokes.bootstrap import BootstrapSettings, friction_draws, mean_inflation, stroke_intervals
+from sessions.strokes.bootstrap import (
+    BootstrapSettings,
+    drag_direction,
+    friction_draws,
+    mean_inflation,
+    stroke_intervals,
+)
 from sessions.strokes.contacts import onset_draws
 from sessions.strokes.stroke import StrokeCurve
 from simulators.bench import BenchSettings
@@ -166,6 +172,12 @@ def test_noise_lowers_a_peak_by_the_greatest_of_as_many_draws():
     mean = integrate.quad(lambda z: z * 80 * stats.norm.cdf(z) ** 79 * stats.norm.pdf(z), -8.0, 8.0)[0]
     for interval, force, noise in ((intervals.peak_normal, 2.0, 0.002), (intervals.peak_tangential, 1.0, 0.001)):
         assert interval == pytest.approx(force + noise * (greatest - 2.0 * mean), abs=0.05 * noise)
+
+
+def test_a_drag_has_the_direction_of_its_force_however_small_it_is():
+    forces = np.array([[0.03, -0.01], [np.nan, np.nan], [0.0, 0.05]])
+    np.testing.assert_allclose(drag_direction(forces), [0.6, 0.8])
+    np.testing.assert_allclose(drag_direction(np.zeros((2, 2))), [1.0, 0.0])  # there is none: along +x
 
 
 def test_an_instant_that_a_person_decided_has_no_interval(strokes):

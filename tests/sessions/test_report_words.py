@@ -84,6 +84,16 @@ def test_a_correlation_over_states_that_no_finger_can_be_in_says_how_many_there_
     )
 
 
+def test_how_far_the_ending_may_be_moved_with_the_same_sign_is_told(report):
+    signs = {-0.5: -1.0, -0.25: 1.0, 0.0: 1.0, 0.25: 1.0, 0.5: 1.0, 0.75: -1.0, 1.0: 1.0, 9.0: 1.0}
+    rows = tuple(
+        replace(p, row={arc: sign * p.sed for arc, sign in signs.items()}) for p in report.predictions
+    )  # beyond where the sign turns it may turn back
+    (sentence,) = [doubt for doubt in doubts(replace(report, predictions=rows)) if "the ending is moved" in doubt]
+    assert sentence.endswith("in stickiness from −0.25 to 0.50 mm and in slipperiness from −0.25 to 0.50 mm.")
+    assert any("is not known here" in doubt for doubt in doubts(report))
+
+
 def test_the_summary_counts_predictions_in_doubt(report):
     first, *rest = report.predictions
     words = " ".join(summary(replace(report, predictions=(replace(first, doubt=DOUBT), *rest))))
