@@ -8,6 +8,7 @@ import pytest
 from recordings import readings
 from stand_ins import CALIBRATION, INFO
 
+from daq_app.recorder.bench import Tap
 from daq_app.recorder.display import Display
 from daq_app.recorder.messages import HealthReport, Live
 from drivers.transducer import Health
@@ -83,3 +84,18 @@ def test_readings_called_invalid_or_doubtful_are_counted_once_in_a_stream(monkey
         watched.now += 1.0
         watched.display.look(Health(saturated=total, doubtful=1))
     assert [report.saturated for report in watched.of(HealthReport)] == [4, 4, 6]
+
+
+def test_what_a_session_reads_is_shown_and_stamped_by_the_session_s_clock(monkeypatch):
+    watched, calls = Watched(monkeypatch), []
+    inner = SimpleNamespace(info=INFO, read=lambda _: readings(5, 3, received_ns=1000))
+    inner.start = lambda: calls.append("start")
+    tap = Tap(inner, watched.display, 250)
+    tap.start()
+    assert calls == ["start"]
+    block = tap.read(0.0)
+    assert block.received_ns.tolist() == [1250] * 3
+    assert block.raw.tolist() == readings(5, 3).raw.tolist()
+    watched.display.look(Health())
+    (live,) = watched.of(Live)
+    assert (live.sequence.tolist(), live.received_ns.tolist()) == ([5, 6, 7], [1250] * 3)

@@ -21,19 +21,30 @@ from sessions.plan.protocols.protocol import protocol
 from sessions.recording import Recording
 from sessions.run.steps import (
     Abort,
+    AskBegin,
+    AskChoice,
+    AskFinish,
     AskMount,
     AskNumber,
+    AskRest,
     AskScore,
     AskStroke,
+    Begin,
+    Finish,
+    MagnitudeEstimate,
     Note,
+    PairedChoice,
     Pause,
     Redo,
+    Resume,
     Scored,
+    Skip,
     StimulusMounted,
     StrokeDone,
+    UndoRedo,
 )
 
-TRIAL = plan(protocol("sensotact-friction"), "S01", 3).trials[0]
+TRIAL, NEXT = plan(protocol("sensotact-friction"), "S01", 3).trials[:2]
 ENDS = ("not at all", "very")
 
 
@@ -57,10 +68,27 @@ def read_line(command, line, *, forces=True):
         (AskScore(TRIAL, ENDS), "redo wrong finger", Redo("wrong finger")),
         (AskStroke(TRIAL), "abort ill", Abort("ill")),
         (AskStroke(TRIAL), "pause", Pause()),
+        (AskStroke(TRIAL), "skip broken sample", Skip("broken sample")),
+        (AskStroke(TRIAL), "undo", UndoRedo()),
+        (AskStroke(TRIAL), "resume", Resume()),
+        (AskNumber(TRIAL, "How rough?"), "12.5", MagnitudeEstimate(12.5, input_device="keyboard")),
+        (AskChoice(TRIAL, NEXT, "Which?"), "1", PairedChoice("first", input_device="keyboard")),
+        (AskChoice(TRIAL, NEXT, "Which?"), "2", PairedChoice("second", input_device="keyboard")),
+        (AskChoice(TRIAL, NEXT, "Which?"), "-", PairedChoice(None, input_device="keyboard")),
+        (AskRest(30.0), "", Resume()),
+        (AskBegin(), "", Begin()),
+        (AskFinish(), "", Finish()),
     ],
 )
 def test_a_line_means_what_was_asked_for(command, line, event):
     assert read_line(command, line)[0] == (event,)
+
+
+def test_a_choice_of_two_names_both_stimuli_and_takes_no_third():
+    events, text = read_line(AskChoice(TRIAL, NEXT, "Which?"), "3")
+    assert events == ()
+    sentence = f"Which? 1 for the first ({TRIAL.stimulus.code}), 2 for the second ({NEXT.stimulus.code}):"
+    assert text.count(sentence) == 2
 
 
 def test_a_number_that_may_be_a_thousand_is_asked_for_again():
