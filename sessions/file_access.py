@@ -1,4 +1,4 @@
-"""Files of a bounded size read, files and folders written whole or not at all, and what mends one that failed."""
+"""Bounded reading of files, atomic writing of files and folders, and remedies for file errors."""
 
 import errno
 import gzip
@@ -19,11 +19,11 @@ import msgspec
 
 LARGEST_TEXT = 4 * 2**20  # of a file that people write [bytes]: the longest built-in protocol is a thousandth of it
 LARGEST_TABLE = 512 * 2**20  # of a CSV file [bytes]: an hour of readings at 2 kHz with seven columns
-LARGEST_DOCUMENT = 256 * 2**20  # of a file that programs write [bytes]: a session of an hour makes a tenth of it
+LARGEST_DOCUMENT = 256 * 2**20  # of a file that programs write [bytes]: a session of an hour takes a tenth of it
 
 LONGEST_LINE = 2**24  # of a table [characters]: an answer with 100 000 positions takes a quarter
-MOST_PACKED = 300  # how many times a packed table may grow [-]: readings grow tenfold, nothing packed a thousandfold
-# What opening or reading a database raises; the second where the name of a damaged table is no text.
+MOST_PACKED = 300  # largest ratio of unpacked to packed size [-]: about 10 for readings, 1000 for zeros
+# Raised on opening or reading a database; the second where the name of a damaged table is not UTF-8.
 DATABASE_FAILURES = (sqlite3.Error, UnicodeDecodeError, OSError)
 
 _RESTORE = "restore it from a copy"
@@ -57,13 +57,13 @@ def read_within_limit(path: Path, limit: int = LARGEST_DOCUMENT) -> bytes:
 
 
 def open_new(path: Path) -> BinaryIO:
-    """Open a file that is made anew for writing; what had its name, a link too, is removed and not followed."""
+    """Create a file for writing; a file or link of that name is removed first, and no link is followed."""
     path.unlink(missing_ok=True)
     return path.open("xb")
 
 
 def gzip_lines(path: Path) -> Iterator[str]:
-    """Yield the lines of a table packed by gzip. Raises ValueError where it grows as no readings do, OSError."""
+    """Yield the lines of a table packed by gzip. Raises OSError, ValueError where it unpacks to too much."""
     size, limit = 0, MOST_PACKED * path.stat().st_size + LARGEST_TEXT
     with gzip.open(path, "rt", encoding="utf-8") as file:
         while line := file.readline(LONGEST_LINE):
@@ -76,19 +76,19 @@ def gzip_lines(path: Path) -> Iterator[str]:
 def limit_values(connection: sqlite3.Connection) -> sqlite3.Connection:
     """Limit the size of a connection's values, let it return texts that are no UTF-8, and return it."""
     connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_DOCUMENT)
-    # A text whose bytes are damaged fits no check sum, instead of failing with its whole table.
+    # A damaged text then fails its check sum alone, instead of making its whole table unreadable.
     connection.text_factory = partial(str, encoding="utf-8", errors="surrogateescape")
     return connection
 
 
 def remedy(error: Exception, *, new: bool = False) -> str:
-    """Say what mends a file that could not be read or written, or a `new` one that could not be made.
+    """Return the remedy for a file that could not be read or written, or a `new` one that could not be created.
 
     >>> remedy(OSError(errno.EIO, "")), remedy(PermissionError(errno.EACCES, ""))
     ('check the disk and its cable', 'permit reading and writing there')
     """
     if isinstance(error, (sqlite3.Error, UnicodeDecodeError)):
-        code: int | None = getattr(error, "sqlite_errorcode", None)  # none where Python itself found the fault
+        code: int | None = getattr(error, "sqlite_errorcode", None)  # None where Python raised the error itself
         return _RESTORE if code is None else _BY_SQLITE.get(code & 0xFF, _RESTORE)  # the low byte is the kind
     number: int | None = getattr(error, "errno", None)
     if number is None and (match := re.search(r"errno = (\d+)", str(error))):  # as HDF5 reports it
@@ -97,7 +97,7 @@ def remedy(error: Exception, *, new: bool = False) -> str:
 
 
 def failure_sentence(error: OSError) -> str:
-    """Return which file that somebody named could not be read or written, why, and what mends it.
+    """Return a sentence about a file that could not be read or written: its name, the cause and the remedy.
 
     >>> failure_sentence(FileNotFoundError(errno.ENOENT, "No such file or directory", "a/b.png"))
     'a/b.png: no such file or directory; check its name'
@@ -116,7 +116,7 @@ def name_failure(
     *,
     new: bool = False,
 ) -> Generator[None]:
-    """Raise `error_type` for a file, perhaps `new`, that cannot be reached: `problem`, cause, remedy, `advice`."""
+    """Raise `error_type` for a failure inside, with a sentence of `problem`, cause, remedy and `advice`."""
     try:
         yield
     except failures as error:
@@ -125,19 +125,19 @@ def name_failure(
 
 
 def write_json(path: Path, document: Mapping[str, Any]) -> None:
-    """Write a JSON text of people's size: indented, UTF-8. Raises ValueError for nan and infinities: JSON has none."""
+    """Write indented JSON in UTF-8. Raises ValueError for nan and infinities, which JSON lacks."""
     path.write_text(json_text(document), encoding="utf-8")
 
 
 def json_text(document: Mapping[str, Any]) -> str:
-    """Return a JSON text of people's size: indented. Raises ValueError for nan and infinities: JSON has none."""
+    """Return indented JSON. Raises ValueError for nan and infinities, which JSON lacks."""
     return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Put `content` into the file at `path` in place of what it held: a reader sees the old or the new.
+    """Replace the content of the file at `path` atomically: a reader sees the old or the new.
 
-    What is no file, such as /dev/null or a pipe, is written to and stays.
+    A device or a pipe, such as /dev/null, is written to directly.
     """
     if path.exists() and not path.is_file():
         path.write_bytes(content)
@@ -147,27 +147,27 @@ def write_whole(path: Path, content: bytes) -> None:
         with open_new(temporary) as file:
             file.write(content)
         put_in_place(temporary, path)
-    except OSError as error:  # a full disk, on which a part of the file would only take room
+    except OSError as error:  # as on a full disk, where half a file would only take space
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
-        error.filename, error.filename2 = str(path), None  # people know no other name of it
+        error.filename, error.filename2 = str(path), None  # the name that people know
         raise
 
 
 def holds_something(folder: Path) -> bool:
-    """Say whether there is anything at `folder` that a new folder would replace."""
+    """Say whether a new folder would replace something at `folder`."""
     return folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
 
 
 @contextmanager
 def whole_folder(folder: Path) -> Generator[Path]:
-    """Lend a folder that gets the name of `folder`, new or empty, once it is whole; else nothing of it is left.
+    """Lend a new folder that takes the name `folder`, free or empty so far, once it is complete; else it is removed.
 
-    Of two at once the first to be whole gets the name, and the other raises FileExistsError.
+    Of two at the same time the first to be complete gets the name; the other raises FileExistsError.
     """
     temporary = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.part")
     try:
-        temporary.mkdir(parents=True)  # fails where a link stands there, which would lead elsewhere
+        temporary.mkdir(parents=True)  # fails on a link, which would lead elsewhere
         yield temporary
         if holds_something(folder):
             raise FileExistsError(errno.EEXIST, "another program has written there meanwhile", str(folder))
@@ -180,9 +180,9 @@ def whole_folder(folder: Path) -> Generator[Path]:
 
 @contextmanager
 def whole_or_nothing(folder: Path, unless: type[Exception]) -> Generator[None]:
-    """Remove a new folder again where what is done inside fails: all that it holds stands elsewhere too.
+    """Remove a new folder where the code inside fails: its content also exists elsewhere.
 
-    Where it raises `unless`, what the folder holds is another program's, and stays.
+    Where the code raises `unless`, the content belongs to another program and stays.
     """
     is_new = not holds_something(folder)
     try:
@@ -216,7 +216,7 @@ def sync_folder(folder: Path) -> None:
 
 @contextmanager
 def one_at_a_time(folder: Path) -> Generator[None]:
-    """Let programs that change files of one folder in only one after the other, where the system locks folders."""
+    """Let only one program at a time change the files of a folder, where the system locks folders."""
     if os.name != "posix":
         yield
         return
@@ -224,7 +224,7 @@ def one_at_a_time(folder: Path) -> Generator[None]:
 
     handle = os.open(folder, os.O_RDONLY)
     try:
-        with suppress(OSError):  # as on a disk of another computer
+        with suppress(OSError):  # not supported on some network disks
             fcntl.flock(handle, fcntl.LOCK_EX)
         yield
     finally:
@@ -235,7 +235,7 @@ T = TypeVar("T")
 
 
 def json_object(text: str | bytes) -> dict[str, Any]:
-    """Return the object in a JSON text. Raises ValueError for anything else, nan and nesting without end included."""
+    """Return the object in a JSON text. Raises ValueError for anything else, nan and endless nesting included."""
     value = json_value(text)
     if not isinstance(value, dict):
         raise ValueError("it holds no names")
@@ -243,7 +243,7 @@ def json_object(text: str | bytes) -> dict[str, Any]:
 
 
 def json_value(text: str | bytes) -> object:
-    """Return the value in a JSON text. Raises ValueError for what is no JSON, nan and nesting without end included."""
+    """Return the value in a JSON text. Raises ValueError for invalid JSON, nan and endless nesting included."""
     try:
         return json.loads(text, parse_constant=_no_number, parse_float=_finite)
     except RecursionError as error:
@@ -251,7 +251,7 @@ def json_value(text: str | bytes) -> object:
 
 
 def leaves(document: Mapping[str, Any], within: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield what a document holds that holds no more names, each under all names on the way to it.
+    """Yield each leaf of a document with its dotted name.
 
     >>> list(leaves({"a": {"b": 1, "c": {"d": [2]}}}))
     [('a.b', 1), ('a.c.d', [2])]
@@ -273,7 +273,7 @@ def _finite(text: str) -> float:
 
 
 def as_type(value: object, form: type[T]) -> T:
-    """Return plain data as the type `form`. Raises ValueError that says which part is of another kind."""
+    """Return plain data as the type `form`. Raises ValueError that names the part of another type."""
     try:
         return msgspec.convert(value, form)
     except msgspec.ValidationError as error:

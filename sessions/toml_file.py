@@ -1,4 +1,4 @@
-"""A TOML file as frozen dataclasses, or one sentence that says which value is wrong and what is allowed; and back."""
+"""TOML to frozen dataclasses and back; a wrong value gives one sentence with what is allowed."""
 
 import json
 import math
@@ -17,7 +17,7 @@ from msgspec import inspect
 from sessions.file_access import LARGEST_TEXT, name_failure, read_within_limit
 
 T = TypeVar("T")
-_type_info = cache(inspect.type_info)  # it takes as long as reading a protocol
+_type_info = cache(inspect.type_info)  # as slow as reading a protocol
 
 
 class SettingsError(ValueError):
@@ -25,7 +25,7 @@ class SettingsError(ValueError):
 
 
 class NotAllowed(SettingsError):
-    """A value that is out of its range; raised by a dataclass that checks itself when it is made."""
+    """A value out of range; raised by a dataclass that checks its fields on creation."""
 
     def __init__(self, key: str, value: object, allowed: str) -> None:
         """Name the `key` as the file does, the `value` found, and what is `allowed`."""
@@ -42,19 +42,19 @@ def check(condition: bool, key: str, value: object, allowed: str) -> None:
 
 
 def check_range(key: str, value: float | None, low: float, high: float, unit: str = "") -> None:
-    """Raise NotAllowed for a value outside of [low, high]; None was left out."""
+    """Raise NotAllowed for a value outside of [low, high]; None passes."""
     if value is not None and not low <= value <= high:
         raise NotAllowed(key, value, f"it must lie between {low} and {high} {unit}".rstrip())
 
 
 def check_text(key: str, text: str) -> None:
-    """Raise NotAllowed for a text that says nothing."""
+    """Raise NotAllowed for a blank text."""
     if not text.strip():
         raise NotAllowed(key, text, "it must not be empty")
 
 
 def check_scale_ends(ends: tuple[str, str] | None) -> None:
-    """Raise NotAllowed where an end of a line has no name; None where there is no line."""
+    """Raise NotAllowed where an end of a line has no name; `ends` is None where there is no line."""
     if ends is not None and not all(end.strip() for end in ends):
         raise NotAllowed("scale_ends", list(ends), "both ends of the scale must be named")
 
@@ -78,9 +78,9 @@ def text_of(path: Path) -> str:
 
 
 def from_toml(text: str, cls: type[T], where: str, instead: Mapping[str, Any] | None = None) -> T:
-    """Return the dataclass that a TOML text describes; `where` is how messages call it. Raises SettingsError.
+    """Return the dataclass that a TOML text describes; `where` names it in messages. Raises SettingsError.
 
-    `instead` are tables and values that count in place of the text's own, or of those that it lacks.
+    Tables and values in `instead` replace those of the text, or add to them.
     """
     try:
         return from_table({**tables_in(text, where), **(instead or {})}, cls, where)
@@ -93,7 +93,7 @@ _COMMA = re.compile(r"^[^#\"'\n]*=[ \t]*([+-]?\d+,\d+)[ \t]*(?:#.*)?$", re.MULTI
 
 
 def tables_in(text: str, where: str) -> dict[str, Any]:
-    """Return what a TOML text holds; `where` is how messages call it. Raises SettingsError."""
+    """Return the tables of a TOML text; `where` names it in messages. Raises SettingsError."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -107,10 +107,10 @@ def tables_in(text: str, where: str) -> dict[str, Any]:
 
 
 def from_table(table: Mapping[str, Any], cls: type[T], where: str) -> T:
-    """Return the dataclass that a table describes; `where` is how messages call the place it came from.
+    """Return the dataclass that a table describes; `where` names its source in messages.
 
-    Unknown keys are refused, whole numbers are taken where a number with a fraction may stand, true and false are no
-    numbers, nan and infinity are refused. Raises SettingsError.
+    Unknown keys are refused, a whole number is taken for one with a fraction, true and false are no numbers, nan and
+    infinity are refused. Raises SettingsError.
     """
     places = {key: (value, form) for key, value, form in _places(table, _type_info(cls), "")}
     for key, (value, form) in places.items():
@@ -170,7 +170,7 @@ def _sentence(error: msgspec.ValidationError, places: Mapping[str, tuple[Any, in
         if absence := re.match(r"Object missing required field `(.*?)`", message):
             return path, f"{_join_key(path, absence[1])} is missing; it must be {_type_text(_inside(form, absence[1]))}"
         return path, f"{path} = {toml_value(value)} is not allowed: it must be {_type_text(form)}"
-    # A dataclass that checks itself names the key, in full or from itself on.
+    # A dataclass that checks itself names the key, in full or relative to itself.
     key = str(getattr(cause, "key", ""))
     if not key:
         return path, f"{path or 'this'}: {cause}"
@@ -224,7 +224,7 @@ _WORDS: Mapping[type[inspect.Type | None], str] = {
 
 
 def toml_text(value: Any) -> str:  # noqa: ANN401  any dataclass of texts, numbers, tuples and dataclasses
-    """Return the TOML text from which `from_toml` makes the same dataclass; what is None is left out."""
+    """Return the TOML text from which `from_toml` makes the same dataclass; None is left out."""
     return "\n".join(_lines(msgspec.to_builtins(value), "")) + "\n"
 
 
@@ -241,7 +241,7 @@ def _lines(table: Mapping[str, Any], name: str) -> Iterator[str]:
 
 
 def _inline(value: Any) -> str:  # noqa: ANN401  as above
-    """Return a value as it stands after the equals sign.
+    """Return a value as TOML writes it after the equals sign.
 
     >>> _inline(("a", 1e-05, True)), _inline({"g": 0.2, "tau": None})
     ('["a", 1e-05, true]', '{g = 0.2}')
@@ -263,7 +263,7 @@ def _inline(value: Any) -> str:  # noqa: ANN401  as above
 
 
 def _escape(character: str) -> str:
-    """Return a character of a text in quotes, or its escape where a terminal would obey it or not show it."""
+    """Return a character of a text in quotes, or its escape where it is not printable."""
     if character.isprintable():
         return character
     code = ord(character)
@@ -271,7 +271,7 @@ def _escape(character: str) -> str:
 
 
 class _Wrong(SettingsError):
-    """A SettingsError that still knows its key, so that the line can be found."""
+    """A SettingsError with its key, from which the line is found."""
 
     def __init__(self, where: str, key: str, sentence: str) -> None:
         super().__init__(f"{where}: {sentence}")
@@ -303,7 +303,7 @@ def _line_number(text: str, key: str) -> int | None:
                 tables[table] = tables.get(table, -1) + 1
                 table += f"[{tables[table]}]"
             if key == table or key.startswith((f"{table}.", f"{table}[")):
-                table_line = number  # where nothing better comes: a key that is missing is missed in its table
+                table_line = number  # the fallback: a missing key is reported at its table
         elif assignment := re.match(r"\s*([\w.\-]+)\s*=", line):
             full = f"{table}.{assignment.group(1)}" if table else assignment.group(1)
             if key == full or key.startswith((f"{full}.", f"{full}[")):

@@ -1,10 +1,10 @@
-"""Orders and labels of stimuli, reproducible from a seed, and the comparison that answers so far ask for next.
+"""Orders and labels of stimuli, reproducible from a seed, and the next comparison of an adaptive block.
 
-The comparison comes by QUEST+ (Watson 2017, J. Vis. 17(3), 10): P(comparison chosen) = lapse / 2 + (1 - lapse) Φ((i -
-PSE) / spread), where i is the stimulus's index. Possible, and equally likely at first, are PSEs within the indices,
-spreads between a fifth of their mean step and their range, both senses and two shares of lapses. Next comes the
-comparison that leaves the least entropy of these, as far as can be expected. It depends on candidates and answers
-alone: a session that is resumed goes on with the same.
+The comparison is chosen by QUEST+ (Watson 2017, J. Vis. 17(3), 10): P(comparison chosen) = lapse / 2 + (1 - lapse) Φ((i
+- PSE) / spread), where i is the stimulus's index. The prior is uniform over PSEs within the indices, spreads between a
+fifth of their mean step and their range, both senses and two lapse rates. The next comparison minimises the expected
+entropy of the posterior. It depends on candidates and answers alone, so a resumed session continues with the same
+comparison.
 """
 
 import hashlib
@@ -21,13 +21,13 @@ from drivers.arrays import Array
 from sessions.plan.plan import SessionPlan, Stimulus, Trial
 
 LETTERS = "BCDFGHJKLMNPQRSTVWXZ"  # no vowels: no label spells a word
-_DRAWS = 10_000  # of an order that is to meet constraints
+_DRAWS = 10_000  # tried for an order that meets the constraints
 
 Item = TypeVar("Item", int, str)
 
 
 def shuffle(items: Sequence[Item], seed: int, name: str) -> tuple[Item, ...]:
-    """Return the items in a random order that `seed` and `name` fix.
+    """Return the items in a random order determined by `seed` and `name`.
 
     The rule: sort by the SHA-256 digest of the UTF-8 text "seed/name/item", each a decimal number or the name itself.
     Every order is equally likely over seeds. Items must differ.
@@ -41,20 +41,20 @@ def shuffle(items: Sequence[Item], seed: int, name: str) -> tuple[Item, ...]:
 def draw(
     items: Sequence[Item], seed: int, name: str, meets: Callable[[Sequence[Item]], bool]
 ) -> tuple[Item, ...] | None:
-    """Return the first order that `meets` a constraint; None where none of many draws does.
+    """Return the first random order that `meets` accepts; None where it rejects all of `_DRAWS` orders.
 
-    The rule: the order `shuffle` gives for `name`, else "name~1" and so on; all that meet it are equally likely.
+    The orders are those of `shuffle` for `name`, "name~1" and so on; all accepted orders are equally likely.
     """
     orders = (shuffle(items, seed, f"{name}~{draw}" if draw else name) for draw in range(_DRAWS))
     return next(filter(meets, orders), None)
 
 
 def williams(count: int) -> tuple[tuple[int, ...], ...]:
-    """Return the rows of a Williams design: orders of 0 to `count` - 1 in which each follows each other equally often.
+    """Return the rows of a Williams design, in which each of 0 to `count` - 1 follows every other equally often.
 
-    Each stands in each position equally often too. Rows are `count` for an even count (each follows each other once),
-    twice that for an odd one (twice): the second square is the first one backwards. E. J. Williams, Australian Journal
-    of Scientific Research A 2 (1949) 149; first row 0, 1, n-1, 2, n-2, ...
+    Each item also has each position equally often. An even count gives `count` rows (each item follows every other
+    once), an odd one twice as many (twice): the second square is the first one reversed. E. J. Williams, Australian
+    Journal of Scientific Research A 2 (1949) 149; first row 0, 1, n-1, 2, n-2, ...
 
     >>> williams(4)
     ((0, 1, 3, 2), (1, 2, 0, 3), (2, 3, 1, 0), (3, 0, 2, 1))
@@ -65,11 +65,11 @@ def williams(count: int) -> tuple[tuple[int, ...], ...]:
 
 
 def pairs(items: Sequence[Item], seed: int, name: str) -> tuple[tuple[Item, Item], ...]:
-    """Return every two of the items once, in an order by chance, each item first as often as second (or nearly).
+    """Return every pair of items once, in a random order, each item first as often as second (or nearly).
 
-    The rule: items stand round a circle in the order `shuffle` gives for "name/first"; of two, the one from which the
-    other is reached sooner clockwise is first (of two that face one another, the earlier one). Pairs come in the order
-    `shuffle` gives for `name` and the texts "first,second".
+    The items are placed round a circle in the order of `shuffle` for "name/first". The first of two is the one from
+    which the other is reached sooner clockwise (of two opposite items, the earlier one). Pairs come in the order of
+    `shuffle` for `name` and the texts "first,second".
     """
     circle = shuffle(items, seed, f"{name}/first")
     count = len(circle)
@@ -84,11 +84,11 @@ def pairs(items: Sequence[Item], seed: int, name: str) -> tuple[tuple[Item, Item
 def pairs_with(
     standard: Item, items: Sequence[Item], seed: int, name: str, repetition: int
 ) -> tuple[tuple[Item, Item], ...]:
-    """Return each item once with the standard, in an order by chance; over two repetitions it is first once.
+    """Pair each item once with the standard, in a random order; over two repetitions it is first once.
 
-    Repetitions count from 1. The rule: of two repetitions, 2 k - 1 and 2 k, the first has those items first that
-    `shuffle` puts into the first half for "name/first/k", and the second has the others first. Pairs come in the order
-    `shuffle` gives for `name` in repetition 1, and for "name#repetition" after it.
+    Repetitions count from 1. Of repetitions 2 k - 1 and 2 k, the former has those items first that `shuffle` puts into
+    the first half for "name/first/k", and the latter the rest. Pairs come in the order of `shuffle` for `name` in
+    repetition 1, and for "name#repetition" after it.
     """
     leaders = shuffle(items, seed, f"{name}/first/{(repetition + 1) // 2}")[: len(items) // 2]
     order = shuffle(items, seed, name if repetition == 1 else f"{name}#{repetition}")
@@ -96,10 +96,10 @@ def pairs_with(
 
 
 def opaque_codes(count: int, seed: int) -> tuple[str, ...]:
-    """Return `count` different labels of a letter and two digits, which tell nothing about what they stand on.
+    """Return `count` different labels of a letter and two digits, which reveal nothing about the stimuli.
 
     The rule: from the SHA-256 digests of "seed/label/0", "seed/label/1", ... as whole numbers, the letter is the
-    remainder by 20 and the digits the remainder by 100 of the quotient; labels that came before are left out.
+    remainder by 20 and the digits the remainder by 100 of the quotient; repeated labels are left out.
     Raises ValueError for more than 2000 labels.
 
     >>> opaque_codes(3, 1)
@@ -123,11 +123,11 @@ def _digest(text: str) -> bytes:
 
 _PSES, _SPREADS = 41, 15  # of the grid: steps of a fortieth of the indices' range, and of a third of a spread
 _LAPSES = (0.0, 0.05)
-_ENTROPY_RESOLUTION = 1e-9  # of entropy: below it two comparisons are alike on any processor, and the first is taken
+_ENTROPY_RESOLUTION = 1e-9  # of entropy: smaller differences depend on the processor; the first comparison is taken
 
 
 def next_comparison(candidates: Sequence[Stimulus], answers: Sequence[tuple[Stimulus, bool]]) -> Stimulus:
-    """Return which of the candidates is compared next, from answers: what was compared, and whether it was chosen."""
+    """Return the candidate to compare next; an answer is a stimulus compared so far, and whether it was chosen."""
     chance = _chances(tuple(candidate.known_index for candidate in candidates))
     belief = np.zeros(chance.shape[0])
     for comparison, choice in answers:
@@ -138,7 +138,7 @@ def next_comparison(candidates: Sequence[Stimulus], answers: Sequence[tuple[Stim
 
 
 def with_comparison(plan: SessionPlan, number: int, answers: Sequence[tuple[Stimulus, bool]]) -> SessionPlan:
-    """Return the plan in which an adaptive pair that begins with a trial compares what the answers ask for."""
+    """Return the plan with the next comparison in the adaptive pair that begins with trial `number`, if one does."""
     block = next(block for block in plan.blocks if any(trial.number == number for trial in block.trials))
     if not block.candidates or number not in {trial.compared_with for trial in block.trials}:
         return plan
@@ -152,7 +152,7 @@ def with_comparison(plan: SessionPlan, number: int, answers: Sequence[tuple[Stim
 
 
 def with_mounted_stimuli(plan: SessionPlan, codes: Mapping[int | None, str]) -> SessionPlan:
-    """Return the plan with the stimuli that were mounted in trials of adaptive blocks; `codes` go by trial number."""
+    """Return the plan with the stimuli that were mounted in trials of adaptive blocks; `codes` are by trial number."""
     stimuli = {(block.name, stimulus.code): stimulus for block in plan.blocks for stimulus in block.candidates}
 
     def mount(trial: Trial) -> Trial:
@@ -163,7 +163,7 @@ def with_mounted_stimuli(plan: SessionPlan, codes: Mapping[int | None, str]) -> 
 
 @cache
 def _chances(indices: tuple[int, ...]) -> Array:
-    """Return the chance of each possible subject to choose each of k comparisons (s, k), kept off 0 and 1."""
+    """Return the probability that each model subject chooses each of k comparisons (s, k), clipped off 0 and 1."""
     reach = float(max(indices) - min(indices))
     step = reach / (len(indices) - 1)
     pses = np.linspace(float(min(indices)), float(max(indices)), _PSES)
@@ -177,7 +177,7 @@ def _chances(indices: tuple[int, ...]) -> Array:
 
 
 def _expected_entropy(weight: Array, chance: Array) -> Array:
-    """Return the entropy of what is possible that is left after an answer to each comparison, on average [nat]."""
+    """Return the expected entropy of the posterior after an answer to each comparison [nat]."""
     entropy_left = np.zeros(chance.shape[1])
     for answer_chance in (chance, 1.0 - chance):
         joint = weight[:, None] * answer_chance

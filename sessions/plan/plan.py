@@ -7,11 +7,11 @@ from typing import Literal
 
 from sessions.toml_file import check_range
 
-Origin = Literal["measured", "set", "default"]  # where a value came from; a default was chosen by nobody
+Origin = Literal["measured", "set", "default"]  # where a value came from; nobody chose a default
 Hand = Literal["left", "right"]
 Phase = Literal["pre-evaluation", "practice", "main"]  # only the trials of "main" are the experiment's
 Answer = Literal["line", "number", "choice", "none"]  # on a 0 to 100 line, a free number, which of two, nothing
-Choice = Literal["first", "second"]  # of two that are compared
+Choice = Literal["first", "second"]  # of the two stimuli compared
 SubjectSees = Literal["instruction", "trial count", "code", "forces"]
 ExperimenterSees = Literal["trial count", "answer", "forces"]
 PROXIMAL_TO_DISTAL = 1
@@ -20,7 +20,7 @@ NORMALS = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
 class Blinded(ValueError):
-    """What was asked for needs to know which stimulus bears which code, and that is still sealed."""
+    """The request needs the key to stimuli and codes, which is still sealed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,11 +29,11 @@ class Stimulus:
 
     descriptor: str  # "stickiness" or "slipperiness", or what a protocol names
     index: int | None  # its maker's number on the descriptor, 0 to 100; not a score; None while blinded
-    code: str  # opaque label on its back, all that experimenter and subject are shown
+    code: str  # opaque label on its back, the only name that experimenter and subject see
 
     @property
     def display_name(self) -> str:
-        """Return its name for people: its descriptor with its index, or with its code while the index is sealed."""
+        """Return the name to display: descriptor and index, or descriptor and code while the index is sealed."""
         return f"{self.descriptor} {self.code if self.index is None else self.index}"
 
     @property
@@ -55,7 +55,7 @@ class Trial:
     repetition: int  # from 1
     phase: Phase = "main"
     answer: Answer = "line"  # what the subject gives when the stroke is done
-    compared_with: int | None = None  # the first of two: number of the trial just before, whose answer is none
+    compared_with: int | None = None  # number of the trial just before, the first of two; its answer is none
     standard: bool = False  # the surface that all others of its block are compared with
 
 
@@ -67,24 +67,24 @@ class Block:
     instruction: str
     direction: int  # +1 proximal to distal, -1 distal to proximal
     indentation: float  # depth the model presses the finger to in this block [mm]
-    scale_ends: tuple[str, str]  # what a score of 0 and of 100 mean; empty where no line is shown
+    scale_ends: tuple[str, str]  # meanings of the scores 0 and 100; empty where no line is shown
     trials: tuple[Trial, ...]
     phase: Phase = "main"
-    question: str = ""  # asked when an answer is due; on a line its ends may say all
+    question: str = ""  # asked when an answer is due; may be empty for a line
     strokes_allowed: int = 1  # in a trial; every further one is recorded and flagged
     ticks: int = 0  # marks on the line between its ends
     indentation_origin: Origin = "set"
-    candidates: tuple[Stimulus, ...] = ()  # among which answers choose what is compared next; empty: it is planned
+    candidates: tuple[Stimulus, ...] = ()  # of an adaptive block, for the next comparison; empty in other blocks
 
     @property
     def standard(self) -> Stimulus | None:
-        """Return the stimulus that all others are compared with; None where there is none."""
+        """Return the stimulus that all others are compared with; None in a block without one."""
         return next((trial.stimulus for trial in self.trials if trial.standard), None)
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """How the transducer's axes lie to the stimulus's face, each value with its origin."""
+    """The stimulus's face in the transducer's axes, each value with its origin."""
 
     normal: str = "-z"  # axis of the wrench along which pressing is positive, one of `NORMALS`
     normal_origin: Origin = "default"
@@ -92,17 +92,17 @@ class Frame:
     height_origin: Origin = "default"
 
     def with_values(self, normal: str | None, height: float | None, height_origin: Origin = "set") -> "Frame":
-        """Return the frame with the values that somebody states in place of its own."""
+        """Return the frame with each value that is not None replaced."""
         frame = self if normal is None else replace(self, normal=normal, normal_origin="set")
         return frame if height is None else replace(frame, height=height, height_origin=height_origin)
 
 
 @dataclass(frozen=True, slots=True)
 class Rests:
-    """When the subject rests: never, unless it says so."""
+    """When the subject rests; by default never."""
 
     after_trials: int | None = None  # of a block; None: not within a block
-    between_blocks: bool = False  # practice and its block are not parted
+    between_blocks: bool = False  # never between a practice and its block
     duration: float | None = None  # [s]; None: until the experimenter goes on
 
     def __post_init__(self) -> None:
@@ -121,7 +121,7 @@ class Visibility:
 
 @dataclass(frozen=True, slots=True)
 class Finger:
-    """The subject's own finger, as far as it was measured or stated; the model's default stands in for the rest."""
+    """The subject's own finger, as far as measured or stated; the model's defaults replace missing values."""
 
     tip_radius: float | None = None  # of the fingertip's outline [mm]
     width: float | None = None  # of the contact, across the finger [mm]
@@ -160,12 +160,12 @@ class SessionPlan:
         return any(trial.stimulus.index is None for trial in self.trials)
 
     def folder_name(self, start: datetime) -> str:
-        """Return the name of the session's folder; in a study, all of whose visits have one protocol, its purpose."""
+        """Return the name of the session's folder; a study's visits share one protocol, so theirs has the purpose."""
         purpose = self.protocol if self.study is None else "forces" if self.forces else "scores"
         return f"{self.subject}_{purpose}_{start:%Y%m%dT%H%M%S}"
 
     def stroke_limit(self, trial: Trial) -> int:
-        """Return how many strokes a trial may have; 1 where no block holds it."""
+        """Return the greatest number of strokes in a trial; 1 where no block holds it."""
         return next((block.strokes_allowed for block in self.blocks if trial in block.trials), 1)
 
     @property
@@ -174,6 +174,6 @@ class SessionPlan:
         return tuple(trial for block in self.blocks for trial in block.trials)
 
     def with_trials(self, change: Callable[[Trial], Trial]) -> "SessionPlan":
-        """Return the plan with each trial as `change` returns it."""
+        """Return the plan with `change` applied to each trial."""
         blocks = (replace(block, trials=tuple(map(change, block.trials))) for block in self.blocks)
         return replace(self, blocks=tuple(blocks))

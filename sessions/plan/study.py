@@ -1,7 +1,7 @@
-"""A study: one protocol, its rows, who is enrolled in which, and the folder with its SQLite file and sealed key.
+"""A study: one protocol, the subjects and their rows, and the folder with its SQLite file and sealed key.
 
 A study is the list of what happened in it, in order. Several programs may enrol at once: each change is one transaction
-that begins by taking the file for itself.
+that first locks the file.
 """
 
 import base64
@@ -46,7 +46,7 @@ class KeyedStimulus(msgspec.Struct, frozen=True):
 class Key(msgspec.Struct, frozen=True):
     """Which stimulus bears which code, throughout a study."""
 
-    salt: str  # hexadecimal, by chance: without it the few possible keys could be tried one by one
+    salt: str  # random, hexadecimal: without it the few possible keys could be tried one by one
     stimuli: dict[str, KeyedStimulus]  # by code
 
     @property
@@ -57,7 +57,7 @@ class Key(msgspec.Struct, frozen=True):
         return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
     def seal(self) -> str:
-        """Return the key as a text that reveals nothing to whoever opens its file by chance (Base64 of JSON)."""
+        """Return the key as Base64 of JSON, which reveals nothing to someone who opens the file by chance."""
         return base64.b64encode(json.dumps(self.to_dict()).encode()).decode()
 
     @property
@@ -67,11 +67,11 @@ class Key(msgspec.Struct, frozen=True):
 
     @staticmethod
     def unseal(text: str) -> "Key":
-        """Return the key that `seal` gave the text for. Raises ValueError where it is none."""
+        """Return the key in a text written by `seal`. Raises ValueError for any other text."""
         return as_type(json_object(base64.b64decode(text, validate=True)), Key)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data, codes sorted."""
+        """Return the key as plain data, codes sorted."""
         return msgspec.to_builtins(self, order="sorted")
 
     def reveal(self, trial: Trial) -> Trial:
@@ -107,13 +107,13 @@ class Member:
 
     subject: str  # a code, never a name
     slot: Annotated[int, msgspec.Meta(ge=0)]  # reserved, from 0; given back on withdrawal
-    body: Body  # what is the subject's own
+    body: Body  # values of the subject
     withdrawn: str | None = None  # why; None while enrolled
 
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """A study as it stands."""
+    """The present state of a study."""
 
     name: str
     protocol: Protocol
@@ -140,7 +140,7 @@ class Study:
 
     @property
     def rows(self) -> int | None:
-        """Return how many rows the design has; None where every order is drawn for itself."""
+        """Return the number of rows of the design; None where each order is drawn independently."""
         return design_rows(self.protocol)
 
     def member(self, subject: str) -> Member:
@@ -153,7 +153,7 @@ class Study:
         return member
 
     def row(self, slot: int) -> int:
-        """Return the row of the design, from 1, that a slot stands for.
+        """Return the row of the design, from 1, of a slot.
 
         Slots fill in turn. Each round of the design has its rows in a random order; without one the slot is the row.
         """
@@ -163,7 +163,7 @@ class Study:
         return shuffle(range(self.rows), self.seed, f"rows/{cycles}")[within] + 1
 
     def session_seed(self, slot: int) -> int:
-        """Return the seed of what else chance decides for a slot: the same for all visits of a subject."""
+        """Return the seed of a slot's other random choices, the same for all visits of a subject."""
         digest = hashlib.sha256(f"{self.seed}/slot/{slot}".encode()).digest()
         return int.from_bytes(digest[:4], "big") % 2**31
 
@@ -175,13 +175,13 @@ class Study:
 
 
 def free_slot(members: Sequence[Member]) -> int:
-    """Return the first slot that nobody holds: one that was given back comes first."""
+    """Return the first free slot; slots given back are reused first."""
     slots = {member.slot for member in members if member.withdrawn is None}
     return next(slot for slot in count() if slot not in slots)
 
 
 def check_code(label: str, code: str) -> None:
-    """Raise SettingsError unless `code` is one: no name, nothing a file's name could not hold."""
+    """Raise SettingsError unless `code` meets `CODE_RULE`; `label` names it."""
     if not is_code(code):
         raise SettingsError(f'{label} "{code}" is not allowed: {CODE_RULE}')
 
@@ -189,11 +189,11 @@ def check_code(label: str, code: str) -> None:
 STUDY_FILE = "study.sqlite"
 KEY_FILE = "sealed-key.json"
 _VERSION = 1
-_HEAD_NAMES = ("version", "protocol", "seed", "key_sha256")  # what the check sum of the head is of, in this order
+_HEAD_NAMES = ("version", "protocol", "seed", "key_sha256")  # input of the head's check sum, in this order
 _PATIENCE = 10.0  # waiting for another program that is enrolling [s]
 
 _TABLES = (
-    # protocol (its TOML text), seed, key_sha256; crc32 is that of the other values
+    # protocol (its TOML text), seed, key_sha256; crc32 covers the other values
     "CREATE TABLE head (name TEXT PRIMARY KEY, value TEXT NOT NULL)",
     """CREATE TABLE events (
         number INTEGER PRIMARY KEY, -- from 1 without gaps
@@ -206,14 +206,14 @@ _TABLES = (
 
 
 def is_study(folder: Path) -> bool:
-    """Say whether a folder is that of a study."""
+    """Say whether a folder holds a study."""
     return (folder / STUDY_FILE).is_file()
 
 
 def create_study(folder: Path, protocol_text: str, seed: int, *, blinded: bool, source: str = "the protocol") -> Study:
-    """Make the folder of a new study, whose protocol is fixed from now on. Raises StudyError, SettingsError.
+    """Create the folder of a new study; its protocol cannot change later. Raises StudyError, SettingsError.
 
-    `source` names the file of the protocol in a sentence on what is wrong with it.
+    `source` names the file of the protocol in error messages.
     """
     protocol = new_protocol(protocol_text, source)
     check_code("the name of the study's folder", folder.name)
@@ -223,7 +223,7 @@ def create_study(folder: Path, protocol_text: str, seed: int, *, blinded: bool, 
     key = _new_key(protocol) if blinded else None
     folder.mkdir(parents=True, exist_ok=True)
     try:
-        (folder / STUDY_FILE).touch(exist_ok=False)  # which one of two programs alone can do
+        (folder / STUDY_FILE).touch(exist_ok=False)  # only one of two programs succeeds
     except FileExistsError:
         refusal = f"{folder} is a study already, and its protocol is fixed: enrol without --protocol"
         raise StudyError(refusal) from None
@@ -235,21 +235,21 @@ def create_study(folder: Path, protocol_text: str, seed: int, *, blinded: bool, 
                 connection.execute(table)
             head["crc32"] = str(_check_sum(*head.values()))
             connection.executemany("INSERT INTO head VALUES (?, ?)", head.items())
-            if key is not None:  # before the study counts as made: without its key it would be lost
+            if key is not None:  # before the commit: a blinded study without its key is lost
                 document = {"what": "which stimulus bears which code; 'daq-app unblind' opens it", "sealed": key.seal()}
                 write_whole(folder / KEY_FILE, json.dumps(document, indent=1).encode() + b"\n")
             _tell(connection, "created", "", {"protocol": protocol.name, "blinded": blinded})
-    except BaseException:  # half a study would stand in the way of the next try
+    except BaseException:  # half a study would block the next try
         for name in (STUDY_FILE, KEY_FILE):
             (folder / name).unlink(missing_ok=True)
-        with suppress(OSError):  # where something else lies in it
+        with suppress(OSError):  # where the folder holds something else
             folder.rmdir()
         raise
     return open_study(folder)
 
 
 def open_study(folder: Path) -> Study:
-    """Return a study as it stands. Raises StudyError."""
+    """Return the present state of a study. Raises StudyError."""
     if not is_study(folder):
         raise StudyError(f"{folder} is no study: there is no {STUDY_FILE}; 'daq-app enrol' with --protocol makes one")
     with _reading(folder) as connection:
@@ -270,7 +270,7 @@ def enrol(folder: Path, subject: str, body: Body) -> Member:
 
 
 def withdraw(folder: Path, subject: str, reason: str) -> Member:
-    """Take a subject out of the study: the place is given back, what was recorded stays. Raises StudyError."""
+    """Withdraw a subject: its slot becomes free, its recordings stay. Raises StudyError."""
     if not reason.strip():
         raise StudyError("say why the subject is withdrawn")
 
@@ -286,7 +286,7 @@ def note(folder: Path, kind: str, data: Mapping[str, Any]) -> Study:
 
 
 def enrolled_visit(folder: Path, subject: str) -> tuple[Protocol, int, Body, StudyPlace]:
-    """Return protocol, seed, body and place of a subject's visit, as its enrolment decided them. Raises StudyError."""
+    """Return protocol, seed, body and place of a subject's visit, as fixed by the enrolment. Raises StudyError."""
     study = open_study(folder)
     member = study.member(subject)
     return study.protocol, study.session_seed(member.slot), member.body, study.place(member, study_key(folder))
@@ -316,8 +316,8 @@ def _new_key(protocol: Protocol) -> Key:
 
 
 def _add_event(folder: Path, subject: str, choose: Callable[[Study], tuple[str, Mapping[str, Any]]]) -> Study:
-    """Add the event that `choose` makes of the study as it stands, while nobody else can change it."""
-    open_study(folder)  # says what is wrong where it is none
+    """Add the event that `choose` returns for the present study, in one transaction."""
+    open_study(folder)  # reports a folder that is no study
     with _transaction(folder) as connection:
         kind, data = choose(_study(connection, folder))
         _tell(connection, kind, subject, data)
@@ -362,7 +362,7 @@ def _study(connection: sqlite3.Connection, folder: Path) -> Study:
             key_sha256=head["key_sha256"] or None,
             events=tuple(_event(*row) for row in events),
         )
-        _ = study.members, study.unblinded  # whatever their events lack is found here, and not where they are used
+        _ = study.members, study.unblinded  # incomplete events fail here, not where they are used
     except (ValueError, KeyError, TypeError, msgspec.ValidationError) as error:
         raise StudyError(f"{path} is damaged ({error}); restore it from a copy") from error
     return study
@@ -372,15 +372,15 @@ def _study(connection: sqlite3.Connection, folder: Path) -> Study:
 def _reading(folder: Path) -> Generator[sqlite3.Connection]:
     path = folder / STUDY_FILE
     with name_failure(StudyError, f"{path} cannot be read", failures=DATABASE_FAILURES):
-        path.open("rb").close()  # says why it cannot be read, which SQLite does not
-        address = f"{path.resolve().as_uri()}?mode=rw"  # to undo a change that was cut short; for reading where it must
+        path.open("rb").close()  # raises the cause, which SQLite does not report
+        address = f"{path.resolve().as_uri()}?mode=rw"  # rolls back an interrupted change; read-only where the file is
         with closing(limit_values(sqlite3.connect(address, uri=True, timeout=_PATIENCE))) as connection:
             yield connection
 
 
 @contextmanager
 def _transaction(folder: Path) -> Generator[sqlite3.Connection]:
-    """Lend a connection in a transaction of its own, which is kept as a whole or not at all."""
+    """Open a connection in one transaction, committed as a whole or not at all."""
     path = folder / STUDY_FILE
     with (
         name_failure(StudyError, f"{path} cannot be changed", ", and repeat", (sqlite3.Error,)),

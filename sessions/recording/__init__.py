@@ -1,4 +1,4 @@
-"""What a session leaves on the disk: written as it happens, sealed when it ends, readable ever after."""
+"""The record of a session on disk: written as it happens, sealed when it ends, readable ever after."""
 
 from sessions.recording.head import Setting, provenance
 from sessions.recording.log import LoggedEvent, Take, TrialRecord

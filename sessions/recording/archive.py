@@ -1,4 +1,4 @@
-"""Seals an ended session: an HDF5 copy for any reader, a description, a manifest; compared before it counts."""
+"""Sealing of an ended session: an HDF5 copy compared with the live file, a description, a manifest."""
 
 import json
 from collections.abc import Iterator
@@ -24,10 +24,10 @@ SEALED = (LIVE_FILE, SEALED_FILE, DESCRIPTION_FILE)
 
 
 def seal(folder: Path) -> None:
-    """Write the sealed copy, the description and the manifest of an ended session beside its live file.
+    """Write the sealed copy, the description and the manifest of an ended session next to its live file.
 
-    The live file becomes read-only, and what a crash left in its log is folded in. Nothing counts as sealed before the
-    copy was read again and found equal, reading by reading. Raises RecordingError.
+    The live file becomes read-only, and a write-ahead log left by a crash is folded in. The session counts as sealed
+    only after the copy was read again and equals the live file, reading by reading. Raises RecordingError.
     """
     if is_sealed(folder):
         raise RecordingError(f"{folder} is sealed already: {MANIFEST_FILE} lists its files")
@@ -64,7 +64,7 @@ def seal(folder: Path) -> None:
 
 
 def problems(folder: Path) -> tuple[str, ...]:
-    """Return a sentence for each thing wrong with a session's files; none for a whole, sealed session.
+    """Return a sentence for each fault of a session's files; none for an intact sealed session.
 
     Checks the SHA-256 of each file, the CRC-32 of each block and event, and each number of the HDF5 copy and of the
     description against the live file. Raises RecordingError where the recording cannot be read at all.
@@ -80,7 +80,7 @@ def _contradictions(recording: Recording) -> Iterator[str]:
     """Yield a sentence for each part of `session.json` that differs from the live file."""
     path = recording.folder / DESCRIPTION_FILE
     if not path.is_file():
-        return  # the manifest says so
+        return  # the manifest reports it
     try:
         stored = json_value(read_within_limit(path))
     except (OSError, ValueError) as error:
@@ -88,5 +88,5 @@ def _contradictions(recording: Recording) -> Iterator[str]:
         return
     current = json.loads(json.dumps(description(recording)))
     for name, stored_value, _ in unlike(stored, current, ""):
-        if stored_value is not ABSENT:  # else an older version did not tell it
+        if stored_value is not ABSENT:  # else an older version did not write it
             yield f"{name.removeprefix('.') or 'all'} of {DESCRIPTION_FILE} differs from the live file"

@@ -1,4 +1,4 @@
-"""What is kept beside a recording: numbers made from it, whether they come out again, and the opened key."""
+"""Files stored next to a recording: derived numbers, whether they are reproduced, and the opened key."""
 
 import os
 import re
@@ -23,21 +23,21 @@ RECORDED = (LIVE_FILE, SEALED_FILE, DESCRIPTION_FILE, MANIFEST_FILE)
 
 
 def store_derived(folder: Path, name: str, data: Mapping[str, Any]) -> Path:
-    """Store `data` as the JSON file `name` (e.g. "analysis.json") with the versions of what made it; return its path.
+    """Store `data` as the JSON file `name` (e.g. "analysis.json") with the software versions; return its path.
 
-    Raises ValueError where `data` holds nan or an infinity: what is not known is None.
+    Raises ValueError where `data` holds nan or an infinity: an unknown value is None.
     """
     document = {**Recording.open(folder).mark, "made_by": software_versions(), **data}
     return _store(folder, name, json_text(document).encode())
 
 
 def store_page(folder: Path, name: str, page: str) -> Path:
-    """Store a page such as "report.html", which itself says where it was simulated; return its path."""
+    """Store a page such as "report.html", which itself says what was simulated; return its path."""
     return _store(folder, name, page.encode())
 
 
 def load_derived(folder: Path, name: str) -> dict[str, Any] | None:
-    """Return what `store_derived` stored under `name`; None where nothing was. Raises RecordingError when damaged."""
+    """Return the document stored by `store_derived`, None where there is none. Raises RecordingError when damaged."""
     path = folder / name
     if not path.is_file():
         return None
@@ -65,9 +65,9 @@ def _store(folder: Path, name: str, content: bytes) -> Path:
 
 
 def check_replaceable(path: Path, heading: str) -> None:
-    """Raise RecordingError where a file that somebody named for a text holds something else than one of these.
+    """Raise RecordingError where a file named for a text holds something else.
 
-    Such a text has the line `heading` at its start, or after a line that says SIMULATED.
+    Such a text begins with the line `heading`, alone or after a line that says SIMULATED.
     """
     content = bytes_of(path)
     if content and heading.encode() not in content.split(b"\n", 2)[:2]:
@@ -79,9 +79,9 @@ _LARGEST = 0.2  # that may be set [-]
 
 
 def gain_error_set(folder: Path) -> float | None:
-    """Return the standard uncertainty of each axis' gain [-] last set for the session in a folder; None: nobody did.
+    """Return the standard uncertainty of each axis' gain [-] last set for the session in a folder; None if never set.
 
-    Raises RecordingError where the file is damaged: what somebody set is not replaced by what nobody did.
+    Raises RecordingError where the file is damaged: the default must not replace a value that was set.
     """
     try:
         stored = load_derived(folder, GAIN_ERROR)
@@ -94,12 +94,12 @@ def gain_error_set(folder: Path) -> float | None:
 
 
 def set_gain_error(folder: Path, gain_error: float) -> None:
-    """Keep the standard uncertainty of each axis' gain [-] for the session in a folder. Raises RecordingError."""
+    """Store the standard uncertainty of each axis' gain [-] for the session in a folder. Raises RecordingError."""
     store_derived(folder, GAIN_ERROR, {"gain_error": gain_error})
 
 
 def parse_gain_error(stored: object) -> float | None:
-    """Return a stored gain error [-], None where none was set. Raises SettingsError where it is no such number."""
+    """Return a stored gain error [-], None where none was set. Raises SettingsError where it is not allowed."""
     if stored is None:
         return None
     if not isinstance(stored, int | float) or not 0.0 <= stored <= _LARGEST:
@@ -107,16 +107,16 @@ def parse_gain_error(stored: object) -> float | None:
     return float(stored)
 
 
-MADE_BY = "made_by"  # versions of what made a stored document
-TIMINGS = frozenset({"wall_s", "setup_s", "estimate_s", "evidence_s", MADE_BY, "SIMULATED"})  # no numbers of a session
-_MOST_NAMED = 20  # differences named one by one
+MADE_BY = "made_by"  # software versions in a stored document
+TIMINGS = frozenset({"wall_s", "setup_s", "estimate_s", "evidence_s", MADE_BY, "SIMULATED"})  # not results of a session
+_MOST_NAMED = 20  # differences listed in full
 
 
 ABSENT = object()  # in place of a value under a name that a document lacks
 
 
 def unlike(stored: Any, fresh: Any, path: str, but: frozenset[str] = frozenset()) -> Iterator[tuple[str, Any, Any]]:  # noqa: ANN401  JSON values
-    """Yield the place of each value that is stored otherwise, what is stored and what is now; names in `but` aside."""
+    """Yield place, stored value and present value of each difference; names in `but` are ignored."""
     if isinstance(stored, Mapping) and isinstance(fresh, Mapping):
         stored_map, fresh_map = cast("Mapping[str, Any]", stored), cast("Mapping[str, Any]", fresh)
         for key in sorted({*stored_map, *fresh_map} - but, key=_rank):
@@ -135,7 +135,7 @@ def unlike(stored: Any, fresh: Any, path: str, but: frozenset[str] = frozenset()
 def complete(document: Mapping[str, Any], form: type[T]) -> T:
     """Return a document that the program wrote itself, as the type `form`.
 
-    A name may be missing only where nothing is known under it. Raises ValueError as `as_type` does.
+    A field may be missing only where its default is None. Raises ValueError as `as_type` does.
     """
     value = as_type(document, form)
     for name, stored, default in unlike(document, to_builtins(value), ""):
@@ -145,7 +145,7 @@ def complete(document: Mapping[str, Any], form: type[T]) -> T:
 
 
 def differences(stored: object, fresh: object, path: str) -> Iterator[str]:
-    """Yield a sentence for each value that was stored otherwise than it comes out now; timings are left out.
+    """Yield a sentence for each value that now differs from the stored one; timings are left out.
 
     >>> list(differences({"a": [1.0, 2.0], "wall_s": 3}, {"a": [1.0, 2.5], "wall_s": 4}, "x"))
     ['x.a[1] was stored as 2.0 and comes out as 2.5 (+25 %)']
@@ -163,12 +163,12 @@ def differences(stored: object, fresh: object, path: str) -> Iterator[str]:
 
 
 def _rank(key: str) -> tuple[int, str]:
-    """Return where a name stands among the differences: what others come from first, what comes of others last."""
+    """Return the sort key of a name among differences: inputs first, derived values last."""
     return (0 if key in ("settings", "options", "decisions") else 2 if key == "bootstrap" else 1), key
 
 
 def explain_differences(name: str, stored: Mapping[str, Any], present: Mapping[str, str]) -> str:
-    """Say of a document whose numbers come out otherwise what changed since it was made.
+    """Return a sentence on what changed since a document was made that is not reproduced.
 
     >>> explain_differences("a.json", {"made_by": {"numpy": "1", "scipy": "2"}}, {"numpy": "1", "scipy": "3"})
     'a.json was made by other versions: scipy 2 then and 3 now'
@@ -190,7 +190,7 @@ def explain_differences(name: str, stored: Mapping[str, Any], present: Mapping[s
 
 
 def first_sentences(sentences: Sequence[str]) -> tuple[str, ...]:
-    """Return the first of many sentences, and how many more there are."""
+    """Return the first of many sentences, and the number of the rest."""
     omitted = len(sentences) - _MOST_NAMED
     return tuple(sentences) if omitted <= 0 else (*sentences[:_MOST_NAMED], f"and {omitted} more numbers differ")
 
@@ -199,7 +199,7 @@ UNBLINDING = "unblinding.json"  # in a session's folder, once its key was opened
 
 
 def reveal(recording: Recording) -> Recording:
-    """Return a session with its indices once its key was opened. Raises RecordingError for another key than its own."""
+    """Return a session, with its indices once its key was opened. Raises RecordingError for a wrong key."""
     if not recording.plan.blinded:
         return recording
     stored = load_derived(recording.folder, UNBLINDING)
@@ -219,14 +219,14 @@ def reveal(recording: Recording) -> Recording:
 
 
 def session_folders(folder: Path) -> tuple[Path, ...]:
-    """Return the session folders in a folder, by name, also those that lack their recording. Raises OSError."""
+    """Return the session folders in a folder, by name, including those without their recording. Raises OSError."""
     return tuple(sorted(path for path in folder.iterdir() if _may_hold_session(path)))
 
 
 def _may_hold_session(path: Path) -> bool:
-    """Return whether a path is a session folder, or one that lost its recording or cannot be looked into."""
+    """Return whether a path is a session folder, or one that lost its recording or is not readable."""
     if not path.is_dir():
-        return path.is_symlink() and not path.exists() and not path.name.startswith(".")  # to a disk that is not there
+        return path.is_symlink() and not path.exists() and not path.name.startswith(".")  # to a disk that is absent
     if not os.access(path, os.R_OK | os.X_OK):
         return True
     return any(os.path.lexists(path / name) for name in (LIVE_FILE, MANIFEST_FILE))  # an export has neither
@@ -245,7 +245,7 @@ def sessions_of(folder: Path) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
 
 
 def force_visit(recordings: Sequence[Recording], subject: str) -> Recording | None:
-    """Return the visit in which a subject stroked on the transducer: the latest that came to its end, if any."""
+    """Return a subject's visit with the transducer: the latest complete one, else the latest, if any."""
     visits = [visit for visit in recordings if visit.plan.subject == subject and visit.plan.forces]
     visits.sort(key=lambda v: (bool((v.end or {}).get("complete")), str(v.provenance.get("created_utc", ""))))
     return visits[-1] if visits else None

@@ -1,4 +1,4 @@
-"""What stands at the head of a recording: is it simulated, the plan, the transducer, where it came from; as JSON."""
+"""The head of a recording as JSON: what was simulated, plan, transducer and provenance."""
 
 import hashlib
 import json
@@ -41,7 +41,7 @@ class Setting:
 
 
 def provenance(clock: Clock, settings: Iterable[Setting] = ()) -> dict[str, Any]:
-    """Return what is known of program, machine and clock at this moment, and the settings given."""
+    """Return the present state of program, machine and clock, and the settings given."""
     return {
         "created_utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "software": software_versions(),
@@ -59,14 +59,14 @@ def provenance(clock: Clock, settings: Iterable[Setting] = ()) -> dict[str, Any]
 
 
 def without_home(address: str) -> str:
-    """Return a device's address with ~ in place of the user's home, whose name is nobody's business.
+    """Return a device's address with ~ in place of the user's home, whose name is private.
 
     >>> without_home(f"nidaq://Dev1?cal={Path.home() / 'FT12345.cal'}").replace(os.sep, "/")
     'nidaq://Dev1?cal=~/FT12345.cal'
     """
     home = str(Path.home())
     for spelling in (home, quote(home, safe=""), quote(home)) if len(home) > 1 else ():
-        # It ends there: /home/anna is not below /home/ann.
+        # The name must end there: /home/anna is not below /home/ann.
         address = re.sub(rf"{re.escape(spelling)}(?![\w.-])", "~", address)
     return address
 
@@ -78,7 +78,7 @@ def _clock_kind(clock: Clock) -> str:
 
 
 def machine() -> dict[str, Any]:
-    """Return the kind of machine this is, never its name or user."""
+    """Return the kind of this machine, never its name or user."""
     return {
         "system": platform.system(),
         "release": platform.release(),
@@ -90,7 +90,7 @@ def machine() -> dict[str, Any]:
 def software_versions() -> dict[str, str]:
     """Return the version of this program, of Python, and of every library a number may depend on.
 
-    `blas` and `simd` too: the last bits of a number depend on who adds, and on what the processor adds at once.
+    `blas` and `simd` too: the last bits of a sum depend on the library and the processor's vector width.
     """
     versions = {"daq-app": _version("daq-app") or "not installed", "python": platform.python_version()}
     libraries = {name: _version(name) for name in (*_LIBRARIES, *OPTIONAL)}
@@ -106,7 +106,7 @@ def software_versions() -> dict[str, str]:
     }
 
 
-@cache  # the metadata of one library take milliseconds to parse, and a loaded library stays as it is
+@cache  # the metadata of one library take milliseconds to parse, and a loaded library does not change
 def _version(name: str) -> str | None:
     try:
         return version(name)
@@ -128,7 +128,7 @@ def write_certificate(folder: Path, certificate: dict[str, Any]) -> Path:
 def certificate_for(folder: Path) -> dict[str, Any] | None:
     """Return the certificate in the nearest folder above `folder` on the same disk; None where there is none.
 
-    `same_program` is added: whether this program and its libraries are those that were tested.
+    `same_program` is added: whether the versions of this program and its libraries are those tested.
     """
     folders = folder.absolute().parents
     disk = next((parent.stat().st_dev for parent in folders if parent.exists()), None)
@@ -145,7 +145,7 @@ def certificate_for(folder: Path) -> dict[str, Any] | None:
 
 
 class _Calibration(msgspec.Struct):
-    """A calibration as the head holds it."""
+    """A calibration in the head."""
 
     serial: str
     raw_unit: str
@@ -157,7 +157,7 @@ class _Calibration(msgspec.Struct):
 
 
 class _Info(msgspec.Struct):
-    """A transducer as the head holds it."""
+    """A transducer in the head."""
 
     uri: str
     driver: str
@@ -174,7 +174,7 @@ class _Info(msgspec.Struct):
 
 
 class _Clock(msgspec.Struct):
-    factor: Annotated[float, msgspec.Meta(ge=0.0)]  # 0: the clock moves when it is waited on
+    factor: Annotated[float, msgspec.Meta(ge=0.0)]  # 0: the clock moves only when a wait ends
     now_ns: Int64
 
 
@@ -194,7 +194,7 @@ class Provenance(msgspec.Struct):
 
 
 def simulated_sentence(info: TransducerInfo | None, subject_simulated: bool) -> str | None:
-    """Return the line that heads every file of a recording in which something was simulated, else None."""
+    """Return the first line of every file of a recording in which something was simulated, else None."""
     simulated = {"transducer": info is not None and info.simulated, "subject": subject_simulated}
     names = [name for name, flag in simulated.items() if flag]
     if not names:
@@ -203,7 +203,7 @@ def simulated_sentence(info: TransducerInfo | None, subject_simulated: bool) -> 
 
 
 def compact_json(value: object) -> str:
-    """Return `value` as compact JSON, every float exact. Raises ValueError for nan and infinities: JSON has none."""
+    """Return `value` as compact JSON, every float exact. Raises ValueError for nan and infinities, which JSON lacks."""
     return json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
 
 
@@ -235,7 +235,7 @@ def info_to_dict(info: TransducerInfo) -> dict[str, Any]:
 
 
 def info_from_dict(data: Mapping[str, Any]) -> TransducerInfo:
-    """Return the transducer `info_to_dict` gave `data` for. Raises ValueError for another shape or matrix hash."""
+    """Return the transducer in `data` of `info_to_dict`. Raises ValueError for another shape or matrix hash."""
     info = as_type(data, _Info)
     stored = info.calibration
     if len(stored.tool) not in (0, 6):
@@ -261,7 +261,7 @@ def info_from_dict(data: Mapping[str, Any]) -> TransducerInfo:
 
 
 def _status_table(info: _Info) -> StatusTable:
-    """Return what the bits of a status mean; early recordings only say which are harmless."""
+    """Return the meaning of the status bits; early recordings only record which are harmless."""
     if info.status_bits is not None:
         return StatusTable(tuple(info.status_bits), info.summary)
     harmless = range(info.harmless.bit_length())

@@ -1,4 +1,4 @@
-"""The event log of a session: what each kind of event holds, and what the log says about each trial."""
+"""The event log of a session: the data of each kind of event, and the record of each trial."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,14 +17,14 @@ OUTCOMES = "scored, numbered, chosen, presented (no answer asked for), not answe
 
 @dataclass(frozen=True, slots=True)
 class LoggedEvent:
-    """One thing that happened in a session, as it was written down."""
+    """One event of a session, as it was logged."""
 
     number: int  # from 1, without gaps
     time_ns: int  # session clock [ns]
     kind: str  # one of the kinds of docs/session-format/events.md
     trial: int | None  # number of the trial it belongs to
     readings: int  # how many readings had been handed to the recording before it
-    data: Mapping[str, Any]  # what else is known, by name; plain JSON values
+    data: Mapping[str, Any]  # further data by name; plain JSON values
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,19 +40,19 @@ class Take:
 
 @dataclass(frozen=True, slots=True)
 class TrialRecord:
-    """What came of one planned trial."""
+    """The outcome of one planned trial."""
 
     trial: Trial
     outcome: Outcome  # "presented": no answer was asked for; "open": the session ended before the trial was done
     take: Take | None  # the take that counts
-    other_takes: tuple[Take, ...]  # discarded ones, and one the recording ended in; their readings are kept too
+    other_takes: tuple[Take, ...]  # discarded ones, and one cut off by the recording's end; their readings are kept too
     score: float | None  # the subject's answer on the line, 0 to 100; None unless outcome is "scored"
     number: float | None = None  # on a scale of the subject's own; None unless outcome is "numbered"
     choice: Choice | None = None  # of the two compared; None unless outcome is "chosen"
 
     @property
     def answer(self) -> float | Choice | None:
-        """Return what the subject answered: a score, a number or which of two; None where it gave none."""
+        """Return the subject's answer: a score, a number or which of two; None without an answer."""
         return next((value for value in (self.score, self.number, self.choice) if value is not None), None)
 
     @property
@@ -120,7 +120,7 @@ _OUTCOMES: Mapping[Answer, Outcome] = {"line": "scored", "number": "numbered", "
 
 
 def _end_take(take: Take, event: LoggedEvent, reason: str | None) -> Take:
-    """Return a take with its end; one that had ended before it was restored or discarded keeps that end."""
+    """Return a take with its end; a take that has an end already keeps it."""
     return replace(take, stop_ns=event.time_ns if take.stop_ns is None else take.stop_ns, discard_reason=reason)
 
 
@@ -130,12 +130,12 @@ def _outcome(trial: Trial, answer: Any) -> Outcome:  # noqa: ANN401  a score, a 
     return "presented" if trial.answer == "none" else "not answered"
 
 
-Int64: TypeAlias = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]  # what SQLite, HDF5 and NumPy hold alike
+Int64: TypeAlias = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]  # the range of SQLite, HDF5 and NumPy
 Count: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
 SixNumbers: TypeAlias = tuple[float, float, float, float, float, float]
 
 _TAKE: list[Any] = [("take", Count)]
-_FIELDS: Mapping[str, list[Any]] = {  # name and type of what events hold at the least; a default where it may lack
+_FIELDS: Mapping[str, list[Any]] = {  # name and type of each required field; a default where it is optional
     "take_started": _TAKE,
     "take_kept": _TAKE,
     "take_restored": _TAKE,
@@ -157,14 +157,14 @@ SHAPES = {kind: msgspec.defstruct("Event", fields) for kind, fields in _FIELDS.i
 
 
 def event_data(kind: str, text: str) -> dict[str, Any]:
-    """Return the data of an event from its JSON text. Raises ValueError where it is none of that kind."""
+    """Return the data of an event from its JSON text. Raises ValueError where it does not fit the kind."""
     data = json_object(text)
     as_type(data, SHAPES.get(kind, dict[str, Any]))
     return data
 
 
 def health_of(log: Iterable[LoggedEvent]) -> Health:
-    """Return the totals of what "losses" events tell."""
+    """Return the totals of "losses" events."""
     events = list(log)
     counts = {name: sum(int(event.data.get(name, 0)) for event in events) for name in COUNTS}
     rate_texts = [str(event.data["rate_words"]) for event in events if "rate_words" in event.data]

@@ -1,4 +1,4 @@
-"""What describes a session: `session.json`, digests of columns and log, and the manifest with each file's SHA-256."""
+"""Description of a session: `session.json`, digests of columns and log, and the manifest of SHA-256 sums."""
 
 import hashlib
 import json
@@ -30,7 +30,7 @@ class Digest:
 def digest_of(blocks: Iterable[ReadingBlock], events: Iterable[LoggedEvent]) -> Digest:
     """Return the digest of readings and events.
 
-    Of a column: little-endian numbers in order; of an event: compact JSON of [time_ns, kind, trial, data], line feed.
+    A column is hashed as little-endian numbers, an event as compact JSON [time_ns, kind, trial, data] and line feed.
     """
     sums = {name: sha256() for name in COLUMNS}
     count = 0
@@ -45,7 +45,7 @@ def digest_of(blocks: Iterable[ReadingBlock], events: Iterable[LoggedEvent]) -> 
 
 
 def content_sha256(recording: Recording) -> str:
-    """Return the SHA-256 of plan, readings and events, however files hold them: an import of an export keeps it."""
+    """Return the SHA-256 of plan, readings and events, independent of file formats: it survives export and import."""
     content = [recording.head["plan"], asdict(digest_of(recording.blocks(), recording.events))]
     return sha256(compact_json(content).encode()).hexdigest()
 
@@ -62,7 +62,7 @@ def different(stored: Digest, computed: Digest) -> Iterable[str]:
 
 
 def description(recording: Recording) -> dict[str, Any]:
-    """Return what `session.json` says: all but the readings and the events, and the digest of those."""
+    """Return the content of `session.json`: everything but readings and events, and the digest of these."""
     digest = digest_of(recording.blocks(), recording.events)
     return {
         **head_of_manifest(recording),
@@ -99,19 +99,19 @@ def _trial(record: TrialRecord) -> dict[str, Any]:
 
 
 def is_sealed(folder: Path) -> bool:
-    """Say whether a session was sealed: the manifest is the last thing that sealing writes."""
+    """Say whether a session was sealed: sealing writes the manifest last."""
     return (folder / MANIFEST_FILE).exists()
 
 
 def head_of_manifest(recording: Recording) -> dict[str, Any]:
-    """Return what a manifest says of itself, as the live file does: what was simulated, and the format."""
+    """Return the head of a manifest, as in the live file: what was simulated, and the format."""
     return {**recording.mark, "format": recording.head["format"]}
 
 
 def list_in_manifest(folder: Path, names: Iterable[str], head: dict[str, Any] | None = None) -> None:
-    """Take the files called `names` into the manifest as they are now; the others stay as listed.
+    """List the files `names` in the manifest with their present content; other entries stay.
 
-    With a `head` the manifest begins anew. Raises RecordingError for a damaged one, OSError.
+    With a `head` a new manifest is begun. Raises RecordingError for a damaged manifest, OSError.
     """
     with one_at_a_time(folder):
         document = _manifest(folder) if head is None else head
@@ -124,7 +124,7 @@ def list_in_manifest(folder: Path, names: Iterable[str], head: dict[str, Any] | 
 
 
 def changed_files(recording: Recording) -> Iterator[str]:
-    """Yield a sentence for each listed file that is gone or not what it was, and one for a damaged manifest."""
+    """Yield a sentence for each listed file that is missing or changed, and one for a damaged manifest."""
     try:
         document = _manifest(recording.folder)
     except RecordingError as damaged:
@@ -146,7 +146,7 @@ class _ListedFile(msgspec.Struct):
 
 
 def _manifest(folder: Path) -> dict[str, Any]:
-    """Return what the manifest holds. Raises RecordingError when it cannot be read."""
+    """Return the content of the manifest. Raises RecordingError when it cannot be read."""
     path = folder / MANIFEST_FILE
     with name_failure(RecordingError, f"{path} cannot be read"):
         content = read_within_limit(path)

@@ -1,4 +1,4 @@
-"""A recording as it lies on the disk, read without altering it, whole or torn."""
+"""Reading of a recording from disk without altering it, whole or torn."""
 
 import errno
 import shutil
@@ -26,7 +26,7 @@ from sessions.recording.schema import RecordingError
 
 # Kinds of events that sealing, resuming and restoring add, each with a sentence on what is missing.
 TELL_LOSSES = frozenset({"log_torn", "not_restored"})
-# What the counts in a "losses" event mean for whoever uses the readings; repeated ones were dropped without harm.
+# The meaning of the counts in a "losses" event for users of the readings; dropping repeated ones does no harm.
 LOSS_SENTENCES = {
     "lost": "{} readings never arrived",
     "malformed": "{} records were malformed and left out",
@@ -42,7 +42,7 @@ LOSS_SENTENCES = {
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One session: head and event log in memory, readings read from the file when asked for."""
+    """One session: head and event log in memory, readings read from the file on request."""
 
     folder: Path
     plan: SessionPlan
@@ -51,7 +51,7 @@ class Recording:
     provenance: Mapping[str, Any]
     events: tuple[LoggedEvent, ...]
     trials: tuple[TrialRecord, ...]  # every planned trial, in the plan's order
-    head: Mapping[str, Any]  # plan and transducer as the file holds them, whatever later versions add to theirs
+    head: Mapping[str, Any]  # plan and transducer as in the file, without additions of later versions
     log_is_whole: bool  # no event is damaged or missing
     _log_losses: tuple[str, ...]
 
@@ -59,10 +59,10 @@ class Recording:
     def open(folder: Path) -> "Recording":
         """Open a session folder, sealed or not, also while it is being written and after a crash.
 
-        Raises RecordingError when it holds no recording, one of a later format, or one whose head is damaged.
+        Raises RecordingError for a folder without a recording, a later format, or a damaged head.
         """
         path = folder / schema.LIVE_FILE
-        with name_failure(RecordingError, f"{path} cannot be read"):  # in a folder that nobody may look into
+        with name_failure(RecordingError, f"{path} cannot be read"):  # in a folder without permission to read
             exists = path.is_file()
         if not exists:
             advice = f"give a session folder{_copy_of(folder)}"
@@ -99,17 +99,17 @@ class Recording:
 
     @property
     def mark(self) -> dict[str, Any]:
-        """Return what heads a document made from this recording; nothing where nothing was simulated."""
+        """Return the mark at the top of a document made from this recording; empty without simulation."""
         return {"SIMULATED": self.simulated_sentence} if self.simulated_sentence else {}
 
     @property
     def end(self) -> Mapping[str, Any] | None:
-        """Return what was recorded at the end of the session; None where it was cut short, or is still running."""
+        """Return the data of the session's end; None where it was cut short, or is still running."""
         return _end(self.events)
 
     @cached_property
     def losses(self) -> tuple[str, ...]:
-        """Name what the file lost or holds damaged, a sentence each; reads the whole file once."""
+        """Return a sentence for each loss or damage in the file; reads the whole file once."""
         problems = list(self._log_losses)
         for _ in self.blocks(problems):
             pass
@@ -117,12 +117,12 @@ class Recording:
 
     @property
     def expected_readings(self) -> int:
-        """Return how many readings the file holds by its events."""
+        """Return the number of readings in the file, by its events."""
         return max((event.readings for event in self.events), default=0)
 
     @property
     def flaws(self) -> tuple[str, ...]:
-        """Name what went wrong while recording, as the event log has it, a sentence each."""
+        """Return a sentence for each problem during recording, from the event log."""
         losses = [event for event in self.events if event.kind == "losses"]
         health = health_of(losses)
         counts = ((sentence, getattr(health, name)) for name, sentence in LOSS_SENTENCES.items())
@@ -150,7 +150,7 @@ class Recording:
         if trial is not None:
             start_ns, stop_ns = self.trial(trial).start_ns, self.trial(trial).stop_ns
             return ReadingBlock.empty() if start_ns is None else self.readings_between(start_ns, stop_ns)
-        # Each block is put where it stays as it comes: joining would hold an hour twice.
+        # Each block is copied straight to its place: joining blocks would hold all readings twice.
         path = self.folder / schema.LIVE_FILE
         bytes_held = _size(path) + _size(_side_file(path, "-wal"))
         capacity = min(bytes_held // schema.BYTES_A_READING, self._row_capacity())
@@ -158,7 +158,7 @@ class Recording:
         buffers = {name: np.empty(shapes[name], dtype) for name, dtype in schema.COLUMNS.items()}
         count = 0
         for block in self.blocks():
-            if count + len(block) > capacity:  # committed since it was counted
+            if count + len(block) > capacity:  # committed after the count
                 break
             for name, column in buffers.items():
                 column[count : count + len(block)] = getattr(block, name)
@@ -167,7 +167,7 @@ class Recording:
         return ReadingBlock(**columns)
 
     def _row_capacity(self) -> int:
-        """Return how many readings the rows have room for, without reading them; a damaged row may claim too much."""
+        """Return the number of readings from the sizes of the rows; a damaged row may claim too many."""
         try:
             with _connect(self.folder / schema.LIVE_FILE) as connection:
                 (size,) = connection.execute("SELECT coalesce(sum(length(sequence)), 0) FROM blocks").fetchone()
@@ -212,7 +212,7 @@ class Recording:
 
 
 def _copy_of(folder: Path) -> str:
-    """Return where else all of a session is, for a sentence on its live file; empty where it was not sealed."""
+    """Return advice to use the sealed copy, for a sentence on the live file; empty where it was not sealed."""
     copy = folder / schema.SEALED_FILE
     return f", or make it again of its sealed copy: 'daq-app import {copy}'" if copy.is_file() else ""
 
@@ -244,7 +244,7 @@ def _blocks(
 
 
 def _block(connection: sqlite3.Connection, number: int) -> ReadingBlock:
-    """Return one block. Raises ValueError when it is not what was written."""
+    """Return one block. Raises ValueError when its check sum or summary differs."""
     names = ", ".join(schema.COLUMNS)
     query = f"SELECT crc32, {names}, {schema.SUMMARY} FROM blocks WHERE rowid=?"
     crc, *row = connection.execute(query, (number,)).fetchone()
@@ -258,7 +258,7 @@ def _block(connection: sqlite3.Connection, number: int) -> ReadingBlock:
 
 
 def _head(path: Path, connection: sqlite3.Connection) -> dict[str, Any]:
-    """Return the head's values by name, JSON already read. Raises RecordingError when it is not ours or damaged."""
+    """Return the head's values by name, JSON parsed. Raises RecordingError when it is not ours or damaged."""
     rows = connection.execute("SELECT name, value, crc32 FROM head ORDER BY number").fetchall()
     head: dict[str, Any] = {}
     for name, value, crc in rows:
@@ -278,10 +278,10 @@ def _head(path: Path, connection: sqlite3.Connection) -> dict[str, Any]:
 
 
 def _events(connection: sqlite3.Connection, losses: list[str]) -> tuple[LoggedEvent, ...]:
-    """Return the undamaged events, and name the others in `losses`."""
+    """Return the undamaged events, and add a sentence for each other one to `losses`."""
     events: list[LoggedEvent] = []
     next_number = 1
-    # By its rowid, which is its number also where the table's definition is damaged
+    # The rowid is the event's number even where the table's definition is damaged.
     rows = connection.execute("SELECT rowid, time_ns, kind, trial, readings, data, crc32 FROM events ORDER BY rowid")
     for number, *row in rows:
         if number != next_number:
@@ -295,7 +295,7 @@ def _events(connection: sqlite3.Connection, losses: list[str]) -> tuple[LoggedEv
 
 
 def _event(number: int, row: Sequence[object]) -> LoggedEvent:
-    """Return an event from its row. Raises ValueError where it is damaged or oddly shaped."""
+    """Return an event from its row. Raises ValueError where it is damaged or does not fit its kind."""
     time_ns, kind, trial, readings, text, crc = as_type(row, tuple[int, str, int | None, int, str, int])
     if schema.event_crc(LoggedEvent(number, time_ns, kind, trial, readings, {}), text) != crc:
         raise ValueError("CRC-32 differs")
@@ -308,7 +308,7 @@ def _connect(path: Path) -> Generator[sqlite3.Connection]:
     sides = (_side_file(path, "-wal"), _side_file(path, "-journal"))
     left_over = [side for side in sides if _size(side)]
     address = f"{path.resolve().as_uri()}?mode=ro"
-    path.open("rb").close()  # says why it cannot be read, which SQLite does not
+    path.open("rb").close()  # raises the cause, which SQLite does not report
     if not left_over:
         with closing(limit_values(sqlite3.connect(address + "&immutable=1", uri=True))) as connection:
             yield connection
@@ -321,7 +321,7 @@ def _connect(path: Path) -> Generator[sqlite3.Connection]:
         if sum(map(_size, (*left_over, path))) > shutil.disk_usage(room).free:
             raise OSError(errno.ENOSPC, f"the copy that is read has no room in {room}")
         for side in left_over:
-            with suppress(FileNotFoundError):  # the database, which is copied last, has what a side file had that goes
+            with suppress(FileNotFoundError):  # the database, copied last, then holds the content of that file
                 shutil.copy(side, room)
         shutil.copy(path, room)
         with closing(limit_values(sqlite3.connect(Path(room) / path.name))) as connection:
@@ -329,7 +329,7 @@ def _connect(path: Path) -> Generator[sqlite3.Connection]:
 
 
 def _answers(connection: sqlite3.Connection) -> bool:
-    """Say whether SQLite can read here: not so where it may not make a side file, or where a rollback is due."""
+    """Say whether SQLite can read in place; it cannot without side files, or where a rollback is due."""
     try:
         connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
     except sqlite3.OperationalError:

@@ -1,6 +1,6 @@
-"""What becomes of a live file after a crash, its log torn, and of one whose name is gone, written anew.
+"""Recovery of a live file with a torn log after a crash, and of one whose name is gone.
 
-SQLite leaves a torn tail of its write-ahead log out without a word; a recording names it. Layout of the log: the SQLite
+SQLite silently drops a torn tail of its write-ahead log; a recording reports it. Layout of the log: the SQLite
 documentation, "WAL-mode File Format".
 """
 
@@ -31,10 +31,10 @@ _HOLE = (0, 0, 0, 0, 0, 0)  # a frame where nothing was ever written
 
 @dataclass(frozen=True, slots=True)
 class LogTail:
-    """What a write-ahead log holds."""
+    """Content of a write-ahead log."""
 
     commits: int  # whole commits not yet folded into the file
-    torn_bytes: int  # bytes after the last whole commit that were written in this run of the log
+    torn_bytes: int  # bytes after the last whole commit written in the current run of the log
 
 
 def log_tail(log: BinaryIO) -> LogTail:
@@ -57,7 +57,7 @@ def log_tail(log: BinaryIO) -> LogTail:
         sums = _sums(frame[_FRAME.size :], order, sums)
         if sums != (frame_1, frame_2):
             break
-        if salts != [salt_1, salt_2]:  # the sums, which leave salts out, go on: damaged, and not of an earlier run
+        if salts != [salt_1, salt_2]:  # its sums, which exclude salts, continue: damaged, not from an earlier run
             suspect = position
             break
         position += _FRAME.size + page_size
@@ -67,9 +67,9 @@ def log_tail(log: BinaryIO) -> LogTail:
 
 
 def _of_this_run(log: BinaryIO, start: int, page_size: int, salts: tuple[int, int], suspect: int | None) -> int:
-    """Return where the last frame carrying `salts` ends, or the one that does not and should, from `start` on.
+    """Return the end of the last frame from `start` on with `salts`, or with damaged ones at `suspect`.
 
-    Frames after it were left over from an earlier run of the log: those of one run lie together, at its head.
+    Later frames belong to an earlier run of the log: the current run's frames are contiguous from the head.
     """
     size = log.seek(0, os.SEEK_END)
     step = _FRAME.size + page_size
@@ -91,7 +91,7 @@ def _read(log: BinaryIO, position: int, count: int) -> bytes:
 
 
 def _next_data(log: BinaryIO, position: int) -> int:
-    """Return where the file holds data again at or after `position`, where the system can tell holes from data."""
+    """Return the position of the next data at or after `position`, where the system reports holes."""
     try:
         return os.lseek(log.fileno(), position, os.SEEK_DATA)
     except (OSError, AttributeError) as none:  # no data up to the end; or the system does not say
@@ -109,7 +109,7 @@ def _sums(data: bytes, order: str, sums: tuple[int, int]) -> tuple[int, int]:
 
 
 def torn_log(path: Path) -> Iterator[str]:
-    """Name what a crash tore off the end of the live file's write-ahead log."""
+    """Yield a sentence on what a crash tore off the end of the live file's write-ahead log."""
     try:
         with path.with_name(f"{path.name}-wal").open("rb", buffering=0) as file:
             size = log_tail(file).torn_bytes
@@ -127,16 +127,16 @@ FILE_SUFFIXES = ("", "-wal")  # the live file, and its log, which holds the newe
 
 
 def identities(path: Path) -> tuple[Identity, ...]:
-    """Return which files lie at the names of a live file and of its write-ahead log."""
+    """Return the identities of the files at the names of a live file and of its write-ahead log."""
     return tuple(_identity(path.with_name(path.name + side)) for side in FILE_SUFFIXES)
 
 
 def rescue(source: sqlite3.Connection, path: Path) -> Path:
     """Copy an open live file, whose name may be gone, into a new folder, and return the path of the copy.
 
-    SQLite reads by the files it holds open, so that names which are gone or name other files do not matter. The folder
-    is made beside that of `path`, in the user's home or in the system's temporary folder, the first that takes it.
-    Raises RecordingError where none does.
+    SQLite reads through its open file handles, so names that are gone or belong to other files do not matter. The
+    folder is created next to that of `path`, in the user's home or in the system's temporary folder, the first that
+    works. Raises RecordingError if all fail.
     """
     reasons: list[str] = []
     for folder in _new_folders(path.absolute().parent):
@@ -169,7 +169,7 @@ def _identity(path: Path) -> Identity:
 
 
 def _new_folders(session: Path) -> Iterator[Path]:
-    """Yield a folder that is not there yet in each place, the best place first."""
+    """Yield a new folder's path in each place, the best place first."""
     for parent in (session.parent, Path.home(), Path(tempfile.gettempdir())):
         numbers = itertools.chain([""], (f"-{number}" for number in itertools.count(2)))
         names = (parent / f"{session.name}-rescued{number}" for number in numbers)
@@ -177,7 +177,7 @@ def _new_folders(session: Path) -> Iterator[Path]:
 
 
 def is_in_use(live: Path) -> bool:
-    """Say whether another program has a live file open, as its recorder has; False where the system does not tell.
+    """Say whether another program has a live file open, as its recorder does; False where the system does not say.
 
     As long as SQLite has a file with a write-ahead log open, it shares a lock on these bytes. Raises OSError.
     """
@@ -194,9 +194,9 @@ def is_in_use(live: Path) -> bool:
 
 
 def fold_log(folder: Path, events: Sequence[LoggedEvent]) -> None:
-    """Fold a log that a crash left into the live file with these events. Raises RecordingError while somebody writes.
+    """Fold a log left by a crash into the live file, which holds `events`. Raises RecordingError while it is in use.
 
-    Folding loses sight of a torn tail, so that an event is added to tell of it.
+    Folding discards a torn tail, so an event that reports it is added.
     """
     live = folder / LIVE_FILE
     if not live.with_name(f"{live.name}-wal").exists():

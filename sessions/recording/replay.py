@@ -1,4 +1,4 @@
-"""A transducer that plays a recording: sequence, device counter, status and raw numbers as they were recorded."""
+"""A transducer that plays a recording: sequence, device counter, status and raw values as recorded."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -14,25 +14,25 @@ from sessions.recording.reader import Recording
 
 
 class RecordedReadings:
-    """Recorded readings in their order, handed over a part at a time and read as they go."""
+    """Recorded readings in order, read and handed over in parts."""
 
     def __init__(self, blocks: Iterator[ReadingBlock]) -> None:
         self._blocks = filter(len, blocks)
         self._queue: list[ReadingBlock] = []
-        self.position = 0  # how many were handed over
+        self.position = 0  # number of readings handed over
 
     def blocks_up_to(self, position: int | None) -> Iterator[ReadingBlock]:
-        """Hand over the next readings until `position` of them were, or until none are left (None: all that are)."""
+        """Yield the next readings until `position` were handed over, or all are (None: all)."""
         while (position is None or self.position < position) and self._look():
             first = self._queue[0]
             yield self._take(len(first) if position is None else min(len(first), position - self.position))
 
     def up_to(self, position: int | None) -> ReadingBlock:
-        """Hand the same over as one."""
+        """Return the readings of `blocks_up_to` in one block."""
         return ReadingBlock.concatenate(list(self.blocks_up_to(position)))
 
     def take_until(self, instant_ns: int) -> ReadingBlock:
-        """Hand over the next readings up to the first that was received later than `instant_ns` [ns]."""
+        """Return the next readings, up to the first received after `instant_ns` [ns]."""
         blocks: list[ReadingBlock] = []
         while self._look():
             late = self._queue[0].received_ns > instant_ns
@@ -44,11 +44,11 @@ class RecordedReadings:
         return ReadingBlock.concatenate(blocks)
 
     def next_received_ns(self) -> int | None:
-        """Return when the next reading was received [ns]; None after the last."""
+        """Return the instant at which the next reading was received [ns]; None after the last."""
         return int(self._queue[0].received_ns[0]) if self._look() else None
 
     def _look(self) -> bool:
-        """Have the next readings at hand, and say whether there are any."""
+        """Fetch the next block if needed, and say whether there is one."""
         if not self._queue:
             self._queue += islice(self._blocks, 1)
         return bool(self._queue)
@@ -62,7 +62,7 @@ class RecordedReadings:
 
 
 class ReplayTransducer:
-    """The transducer of a recording: each reading comes as long after the start as it did then."""
+    """The transducer of a recording: each reading comes as long after the start as when recorded."""
 
     def __init__(self, recording: Recording, clock: Clock, uri: str) -> None:
         """Run on `clock`, under the address `uri`. Raises SetupError for a recording without readings."""
@@ -71,7 +71,7 @@ class ReplayTransducer:
         first_ns = self._readings.next_received_ns()
         if recording.info is None or first_ns is None:
             raise SetupError(f"{recording.folder} holds no readings to replay; give a session with forces")
-        # Whatever comes of a simulated session is simulated, whichever part of it was.
+        # A replay counts as simulated if any part of the session was.
         self.info: TransducerInfo = replace(
             recording.info, uri=uri, driver="replay", simulated=recording.simulated or recording.info.simulated
         )
@@ -85,7 +85,7 @@ class ReplayTransducer:
 
     @property
     def health(self) -> Health:
-        """Totals so far: what the recording says of lost and distrusted readings, when it said it."""
+        """Totals so far of lost and doubtful readings, each counted when the recording reported it."""
         return replace(
             health_of(event for event in self._losses if event.readings <= self._readings.position),
             received=self._readings.position,
@@ -93,11 +93,11 @@ class ReplayTransducer:
         )
 
     def start(self) -> None:
-        """Begin: the first reading is due now."""
+        """Start: the first reading is due now."""
         self._shift_ns = self._clock.now_ns() - self._first_ns
 
     def read(self, timeout: float) -> ReadingBlock:
-        """Return what is due by now. Raises LinkLost after the last reading."""
+        """Return the readings that are due, after at most `timeout` [s]. Raises LinkLost after the last reading."""
         shift = self._shift_ns
         if shift is None:
             return ReadingBlock.empty()
@@ -112,7 +112,7 @@ class ReplayTransducer:
         return self._shift(self._readings.take_until(self._clock.now_ns() - shift), shift)
 
     def stop(self) -> None:
-        """Hand over no reading later than this instant."""
+        """Stop: later readings are not handed over."""
         if self._stopped_ns is None and self._shift_ns is not None:
             self._stopped_ns = self._clock.now_ns() - self._shift_ns
 

@@ -1,6 +1,6 @@
-"""The live store: one SQLite file a session. Its tables, their meaning, its version, and its check sums.
+"""The live store, one SQLite file for each session: its tables, version and check sums.
 
-`docs/session-format.md` says the same to someone without this program; keep the two together.
+`docs/session-format.md` describes the same for someone without this program; keep both in step.
 """
 
 import zlib
@@ -19,19 +19,19 @@ class RecordingError(Exception):
 
 
 class DiskRefused(RecordingError):
-    """The disk takes no more of a session; `reason` says it without what is safe, and ends with what mends it."""
+    """The disk takes no more of a session; `reason` is the cause and its remedy, without what is safe."""
 
     def __init__(self, sentence: str, reason: str) -> None:
-        """Take the sentence of a session that goes on when resumed, and the reason alone."""
+        """Store the full sentence and the reason alone."""
         super().__init__(sentence)
         self.reason = reason
 
 
 class NotEmpty(RecordingError):
-    """A folder that was to be a new session's holds something, which stays."""
+    """The folder for a new session is not empty; its content stays."""
 
     def __init__(self, folder: Path) -> None:
-        """Take the folder."""
+        """Name the folder."""
         super().__init__(f"{folder} is not empty; give a new folder, for nothing is written over")
 
 
@@ -46,7 +46,7 @@ MANIFEST_FILE = "MANIFEST.json"
 
 
 def check_format(form: Any) -> None:  # noqa: ANN401  any JSON value
-    """Raise ValueError unless a format, as heads and `session.json` tell it, is one that this program reads."""
+    """Raise ValueError unless this program reads a format, as stated in heads and in `session.json`."""
     match form:
         case {"name": name, "version": int(version)} if name == FORMAT and version <= FORMAT_VERSION:
             return
@@ -105,7 +105,7 @@ def event_crc(event: LoggedEvent, data: str) -> int:
 
 
 def event_row(event: LoggedEvent) -> tuple[int, int, str, int | None, int, str, int]:
-    """Return the row of an event. Raises ValueError for nan or an infinity in its data: JSON has none."""
+    """Return the row of an event. Raises ValueError for nan or an infinity in its data, which JSON lacks."""
     data = compact_json(event.data)
     return event.number, event.time_ns, event.kind, event.trial, event.readings, data, event_crc(event, data)
 

@@ -1,6 +1,6 @@
 """The HDF5 copy of a recording: what it holds, how it is written, and whether it equals the live file.
 
-`docs/session-format.md` describes each data set and unit for someone without this program; keep the two together.
+`docs/session-format.md` describes each data set and unit for someone without this program; keep both in step.
 """
 
 # h5py brings no types; every array is given its type where it leaves this file.
@@ -25,13 +25,13 @@ from sessions.recording.log import OUTCOMES
 from sessions.recording.reader import Recording
 from sessions.recording.schema import COLUMNS, FORMAT, FORMAT_VERSION, SEALED_FILE
 
-CHUNK_BYTES = 32_768  # as a chunk of the readings' columns has
-EVENT_DATA = "events/data"  # a data set of texts, of which an answer's may be thousands of times another's
+CHUNK_BYTES = 32_768  # as in a chunk of the readings' columns
+EVENT_DATA = "events/data"  # a data set of texts, whose lengths may differ a thousandfold
 ENDS_SUFFIX = "_end"  # of the name of the data set that holds where each text ends
 
 
 class _Disk(io.RawIOBase):
-    """Takes what HDF5 writes, and keeps the first failure: raised at once, it would leave an open file."""
+    """Receives HDF5's writes and stores the first failure: raised immediately, it would leave an open file."""
 
     def __init__(self, path: Path) -> None:
         self.failure: OSError | None = None
@@ -40,7 +40,7 @@ class _Disk(io.RawIOBase):
     def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
         return self._file.seek(offset, whence)
 
-    def readinto(self, buffer: Any, /) -> int | None:  # noqa: ANN401  whatever has a buffer
+    def readinto(self, buffer: Any, /) -> int | None:  # noqa: ANN401  any buffer
         return self._file.readinto(buffer)
 
     def write(self, data: Any, /) -> int:  # noqa: ANN401
@@ -51,7 +51,7 @@ class _Disk(io.RawIOBase):
                 remaining = remaining[self._file.write(remaining) :]
         except OSError as error:
             self.failure = error
-        return count  # as if all was written
+        return count  # as if all were written
 
     def truncate(self, size: int | None = None, /) -> int:
         try:
@@ -67,12 +67,12 @@ class _Disk(io.RawIOBase):
 
 @contextmanager
 def new_hdf5(path: Path, **options: Any) -> Generator[h5py.File]:  # noqa: ANN401  what h5py.File takes
-    """Lend a new HDF5 file. Raises OSError once it is closed where the disk did not take all."""
+    """Lend a new HDF5 file. Raises OSError after closing it if a write failed."""
     with _Disk(path) as disk:
         try:
             with h5py.File(disk, "w", **options) as file:
                 yield file
-        except Exception:  # of whatever kind, when what was not written is read again
+        except Exception:  # of any type, when HDF5 reads data that were not written
             if disk.failure is None:
                 raise
         if disk.failure is not None:
@@ -95,7 +95,7 @@ def write_texts(file: h5py.File, name: str, column: Iterable[str]) -> tuple[h5py
 
 
 def read_texts(file: h5py.File, name: str) -> Iterator[bytes]:
-    """Yield the texts of a column, those of fixed length that files of version 1 hold too. Raises OSError, KeyError."""
+    """Yield the texts of a column, also those of fixed length in files of version 1. Raises OSError, KeyError."""
     column: Any = file[name]
     if column.dtype.kind == "S":
         rows = max(CHUNK_BYTES // column.dtype.itemsize, 1)
@@ -116,7 +116,7 @@ def _append(data_set: h5py.Dataset, buffer: bytearray) -> None:
         buffer.clear()
 
 
-# Superblock 2 and nothing that HDF5 1.8 does not know: older MATLAB cannot read later files.
+# Superblock 2 and nothing beyond HDF5 1.8: older MATLAB cannot read later files.
 LIBVER = ("v108", "v108")
 CHUNK = 4096  # readings a chunk
 READING_NOTES = {
@@ -142,7 +142,7 @@ class DataSet:
 def write_copy(
     recording: Recording, path: Path, further: Iterable[DataSet] = (), progress: Callable[[float], None] | None = None
 ) -> None:
-    """Write the copy of a recording, and what else belongs in it, to a new file at `path`. Raises OSError."""
+    """Write the copy of a recording, and the data sets `further`, to a new file at `path`. Raises OSError."""
     total = recording.expected_readings or 1
     with new_hdf5(path, libver=LIBVER) as file:
         if recording.simulated_sentence:
@@ -170,7 +170,7 @@ def write_copy(
                 # Some readers (GNU Octave) know no UTF-8; most texts need none.
                 plain = all(text.isascii() for text in entry.values.tolist())
                 dtype = h5py.string_dtype("ascii" if plain else "utf-8", dtype.itemsize)
-            # An empty data set has no chunks, and so nothing to protect.
+            # An empty data set has no chunks to protect.
             storage = {"chunks": entry.values.shape, "fletcher32": True} if entry.values.size else {}
             data_set = file.create_dataset(entry.name, data=entry.values.astype(dtype), **storage)
             _describe(data_set, entry.unit, entry.note)
@@ -189,7 +189,7 @@ def differences(recording: Recording) -> Iterator[str]:
             older = int(file.attrs.get("format_version", 0)) < FORMAT_VERSION
             for entry in data_sets(recording):
                 if older and entry.name not in file:
-                    continue  # a later version holds more
+                    continue  # only later versions hold it
                 values, stored = entry.values, np.asarray(file[entry.name])
                 if stored.shape != values.shape or stored.astype(values.dtype).tobytes() != values.tobytes():
                     yield f"{entry.name} of {SEALED_FILE} differs from the live file"
@@ -203,7 +203,7 @@ def differences(recording: Recording) -> Iterator[str]:
 
 
 def data_sets(recording: Recording) -> tuple[DataSet, ...]:
-    """Return everything the copy holds besides the readings and the data of the events."""
+    """Return all data sets of the copy except readings and data of events."""
     return (*_head(recording), *_calibration(recording), *_events(recording), *_trials(recording))
 
 
@@ -238,7 +238,7 @@ def _events(recording: Recording) -> Iterator[DataSet]:
 
 
 def _event_texts(recording: Recording) -> Iterator[str]:
-    """Yield what each event holds besides, as JSON: all of them at once may be more than memory holds."""
+    """Yield the data of each event as JSON: together they may exceed the memory."""
     return (_plain_json(event.data) for event in recording.events)
 
 
@@ -275,7 +275,7 @@ def _different_readings(recording: Recording, file: h5py.File) -> Iterator[str]:
     for block in recording.blocks():
         stop = start + len(block)
         for name in COLUMNS:
-            # NaN never equals itself: the bytes are compared, not the numbers.
+            # Bytes are compared, not numbers: NaN never equals itself.
             if np.asarray(file["readings"][name][start:stop]).tobytes() != getattr(block, name).tobytes():
                 yield f"{name} of the readings {start} to {stop - 1} in {SEALED_FILE} differs from the live file"
         start = stop
@@ -294,15 +294,15 @@ def _int64(values: Sequence[int]) -> Indices:
 
 
 def _plain_json(value: object) -> str:
-    """Return JSON in ASCII alone: what is beyond it is escaped."""
+    """Return JSON in ASCII; other characters are escaped."""
     return json.dumps(value, allow_nan=False, separators=(",", ":"))
 
 
 def texts(values: Sequence[str]) -> NDArray[np.bytes_]:
-    """Return texts as UTF-8 of the longest one's length."""
+    """Return texts as UTF-8, all with the length of the longest one."""
     return np.array([value.encode() for value in values], "S") if values else np.empty(0, "S1")
 
 
 def _attribute(text: str | None) -> np.bytes_ | None:
-    """Return a text as HDF5 attributes hold it: fixed length, plain."""
+    """Return a text for an HDF5 attribute: bytes of fixed length."""
     return None if text is None else np.bytes_(text.encode())

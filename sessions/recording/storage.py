@@ -1,8 +1,7 @@
-"""Where a session is recorded: how much room it takes, a reserve for its end, and whether the folder is safe.
+"""Storage of a session: the disk space it needs, a reserve for its end, and whether the folder is safe.
 
-The write-ahead log of the live file and its locks work on a disk of this computer only (SQLite documentation, "Write-
-Ahead Logging", disadvantage 1). A program that synchronises takes files away, or puts older ones back, while they are
-written.
+The write-ahead log of the live file and its locks work on a local disk only (SQLite documentation, "Write-Ahead
+Logging", disadvantage 1). A program that synchronises removes files, or restores older ones, while they are written.
 """
 
 import os
@@ -20,7 +19,7 @@ from sessions.file_access import open_new
 from sessions.plan.plan import SessionPlan
 from sessions.recording.schema import BYTES_A_READING, RecordingError
 
-RATE_UNKNOWN = 1000.0  # readings a second assumed of a device that does not tell [Hz]
+RATE_UNKNOWN = 1000.0  # readings a second assumed of a device that does not report them [Hz]
 TRIAL_TIME = 90.0  # mounting, zero, stroke and score, with a redo now and then [s]
 BLOCK_TIME = 300.0  # instruction, questions, a rest [s]
 COPIES = 2  # the live file and its sealed copy
@@ -30,9 +29,9 @@ RESERVE = 16 * 2**20  # enough for the last seconds of readings, the end, and fo
 
 
 def check_room(folder: Path, plan: SessionPlan, rate: float | None) -> None:
-    """Raise RecordingError where the disk `folder` is to lie on has less room than a session may take.
+    """Raise RecordingError where the disk of `folder` has less free space than a session may need.
 
-    `rate` is that of the readings [Hz], nan where it is unknown, None without a transducer.
+    `rate` of readings [Hz] is nan where unknown, None without a transducer.
     """
     duration = len(plan.trials) * TRIAL_TIME + len(plan.blocks) * BLOCK_TIME
     rows_a_second = 0.0 if rate is None else rate if isfinite(rate) else RATE_UNKNOWN
@@ -48,7 +47,7 @@ def check_room(folder: Path, plan: SessionPlan, rate: float | None) -> None:
 
 
 def take_reserve(folder: Path, size: int) -> None:
-    """Take room in advance, given back on a full disk to write the end. Raises OSError where disk or quota lack it."""
+    """Reserve disk space, released on a full disk to write the end. Raises OSError where disk or quota lack it."""
     with open_new(folder / RESERVE_FILE) as file:
         if hasattr(os, "posix_fallocate"):
             os.posix_fallocate(file.fileno(), 0, size)
@@ -58,20 +57,20 @@ def take_reserve(folder: Path, size: int) -> None:
 
 
 def release_reserve(folder: Path) -> None:
-    """Give back a reserve that was taken in `folder`, also by a process that was killed. Harmless when repeated."""
+    """Release the reserve in `folder`, also that of a killed process. Harmless when repeated."""
     with suppress(OSError):
         (folder / RESERVE_FILE).unlink(missing_ok=True)
 
 
-# File systems whose blocks lie on another computer, on the host of a virtual machine, or in a cloud, as Linux
-# (/proc/mounts) and macOS (mount) name them.
+# File systems stored on another computer, on the host of a virtual machine, or in a cloud, by their names in Linux
+# (/proc/mounts) and macOS (mount).
 REMOTE = re.compile(
     r"nfs[34]?|cifs|smb[23]|smbfs|afpfs|webdav|davfs2?|ncpfs|afs|coda|ceph|glusterfs|lustre|gpfs|beegfs|orangefs|pvfs2"
     r"|fuse\.(sshfs|rclone|davfs2?|glusterfs|ceph|s3fs|gcsfuse|goofys|curlftpfs|smbnetfs|mfs|juicefs)|(osx|mac)fuse_sshfs"
     r"|vboxsf|vmhgfs|fuse\.vmhgfs-fuse|prl_fs|drvfs"
     r"|fuse\.(google-drive-ocamlfuse|onedriver|dropbox|pcloud|insync|mega|keybase|expandrive)"
 )
-# Names of folders under which a synchronising program keeps its files, as those programs call them.
+# Names of the folders in which synchronising programs keep their files.
 SYNC_FOLDERS: tuple[tuple[str, str], ...] = (
     (r"dropbox( \(.*\))?", "Dropbox"),
     (r"onedrive( - .*)?", "OneDrive"),
@@ -87,7 +86,7 @@ SYNC_FOLDERS: tuple[tuple[str, str], ...] = (
     (r"mega(sync)?( downloads)?", "MEGA"),
     (r"sciebo|switchdrive|polybox|surfdrive", "ownCloud"),
 )
-# What such a program leaves in the topmost folder it looks after.
+# Marker files of such programs in the topmost folder that they synchronise.
 SYNC_MARKS: tuple[tuple[str, str], ...] = (
     (".dropbox", "Dropbox"),
     (".dropbox.cache", "Dropbox"),
@@ -99,7 +98,7 @@ SYNC_MARKS: tuple[tuple[str, str], ...] = (
     (".tmp.driveupload", "Google Drive"),
 )
 SYNC_DATABASE = re.compile(r"\._?sync_[0-9a-f]+\.db")  # of ownCloud and Nextcloud
-SYNC_VARIABLES = ("OneDrive", "OneDriveCommercial", "OneDriveConsumer")  # set by Windows to where OneDrive keeps files
+SYNC_VARIABLES = ("OneDrive", "OneDriveCommercial", "OneDriveConsumer")  # set by Windows to OneDrive's folders
 MOVE = "record into a folder on a disk of this computer, and copy it when it is sealed"
 
 
@@ -112,7 +111,7 @@ class Mount(NamedTuple):
 
 
 def unsafe(folder: Path) -> str | None:
-    """Return a sentence why a session must not be recorded in `folder`, which need not be there yet; None: it may."""
+    """Return why a session must not be recorded in `folder`, which need not exist yet; None where it may."""
     location = folder.resolve()
     if (network := _on_a_network(location)) is not None:
         return network
@@ -123,7 +122,7 @@ def unsafe(folder: Path) -> str | None:
 
 
 def file_system(folder: Path) -> str | None:
-    """Return the kind of file system `folder` lies on, such as ext4; None where the system does not tell."""
+    """Return the kind of file system of `folder`, such as ext4; None where the system does not say."""
     mount = None if sys.platform == "win32" else innermost(folder.resolve(), _mounts())
     return None if mount is None else mount.kind
 
@@ -131,12 +130,12 @@ def file_system(folder: Path) -> str | None:
 def innermost(path: PurePath, mounts: Iterable[Mount]) -> Mount | None:
     """Return the mount that holds `path`."""
     containing = [mount for mount in mounts if path.is_relative_to(mount.path)]
-    # Of several at one path the last hides the others, and `max` takes the first of equals.
+    # Of several mounts at one path the last hides the others, and `max` returns the first of equals.
     return max(reversed(containing), key=lambda mount: len(mount.path.parts), default=None)
 
 
 def network_mount(path: PurePath, mounts: Iterable[Mount]) -> Mount | None:
-    """Return the mount that holds `path` where that lies on another computer, else None."""
+    """Return the mount that holds `path` if it is on another computer, else None."""
     mount = innermost(path, mounts)
     if mount is None or REMOTE.fullmatch(mount.kind):
         return mount
@@ -145,13 +144,13 @@ def network_mount(path: PurePath, mounts: Iterable[Mount]) -> Mount | None:
 
 
 def sync_folder_above(path: PurePath) -> str | None:
-    """Return the program whose folder `path` lies in, by the names of the folders above and itself; None: none."""
+    """Return the program that synchronises `path`, by the names of the path's folders; None without one."""
     folders = ((name, pattern, program) for name in path.parts for pattern, program in SYNC_FOLDERS)
     return next((program for name, pattern, program in folders if re.fullmatch(pattern, name, re.IGNORECASE)), None)
 
 
 def linux_mounts(table: str) -> tuple[Mount, ...]:
-    """Return the mounts of /proc/self/mounts; blanks in names are written as octal numbers there."""
+    """Return the mounts of /proc/self/mounts; blanks in names are octal escapes there."""
     mounts: list[Mount] = []
     for line in table.splitlines():
         fields = (re.sub(r"\\([0-7]{3})", lambda octal: chr(int(octal[1], 8)), text) for text in line.split()[:3])

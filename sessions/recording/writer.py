@@ -1,4 +1,4 @@
-"""The one writer of a session: a commit a second, and at once for every event and score."""
+"""The one writer of a session: a commit every second, and immediately for every event and score."""
 
 import sqlite3
 from collections.abc import Callable, Mapping, Sequence
@@ -24,22 +24,22 @@ from sessions.recording.schema import RecordingError
 from sessions.recording.storage import RESERVE_FILE, release_reserve, take_reserve
 
 COMMIT_EVERY_NS = 1_000_000_000
-LARGEST_BLOCK = 65_536  # readings: about 6 MB, far below what one SQLite row may hold
+LARGEST_BLOCK = 65_536  # readings: about 6 MB, far below SQLite's limit for a row
 
 
 @dataclass(frozen=True, slots=True)
 class Acknowledged:
-    """What is safe on the disk: it survives the end of this process and of the machine's power."""
+    """Amount of data safe on the disk: they survive a crash of the program and a power cut."""
 
     readings: int = 0
     events: int = 0
-    time_ns: int = 0  # session clock when it became so
+    time_ns: int = 0  # session clock at that commit
 
 
 class SessionWriter:
-    """Writes one session into a folder of its own. Everything else is in memory until `acknowledged` counts it."""
+    """Writes one session into its own folder. Data not yet counted in `acknowledged` are in memory only."""
 
-    durable = True  # a commit waits until it is on the disk
+    durable = True  # a commit waits until the data are on the disk
 
     def __init__(self, connection: sqlite3.Connection, path: Path, clock: Clock) -> None:
         """Use `SessionWriter.create`."""
@@ -50,12 +50,12 @@ class SessionWriter:
         self._blocks: list[ReadingBlock] = []  # handed over, not yet safe
         self._events: list[LoggedEvent] = []
         self._block_rows = 0
-        self.reading_count = 0  # handed over, from the beginning of the recording
+        self.reading_count = 0  # handed over since the beginning of the recording
         self._event_count = 0
-        self.acknowledged = Acknowledged(time_ns=clock.now_ns())  # how much is safe
+        self.acknowledged = Acknowledged(time_ns=clock.now_ns())  # at the last commit
         self._failure: str | None = None
         self.safe: Callable[[Sequence[LoggedEvent]], None] = lambda _: None  # called with events once they are safe
-        self.must_end: str | None = None  # why only the end should still be written
+        self.must_end: str | None = None  # reason to end the session now
 
     @classmethod
     def create(
@@ -69,11 +69,11 @@ class SessionWriter:
         clock: Clock | None = None,
         reserve: int = 0,
     ) -> Self:
-        """Begin a recording in `folder`, which is made, or is empty: nothing is ever written over.
+        """Begin a recording in `folder`, new or empty: nothing is ever overwritten.
 
         `info` is None for a scores-only visit. `clock` times events and commits (the machine's when None). `reserve`
-        bytes are taken in advance, so that the end can be written on a full disk.
-        Raises RecordingError when the folder holds something or cannot be written.
+        bytes are reserved so that the end can be written on a full disk. Raises RecordingError when the folder is not
+        empty or cannot be written.
         """
         simulated = simulated_sentence(info, subject_simulated)
         head = {
@@ -96,7 +96,7 @@ class SessionWriter:
             path.touch(exist_ok=False)
         except OSError as error:
             _leave(folder)
-            if path.exists():  # made by another program since the look into the folder
+            if path.exists():  # made by another program after the check
                 raise schema.NotEmpty(folder) from error
             raise RecordingError(
                 f"{folder} cannot hold a recording ({error.strerror}); "
@@ -107,7 +107,7 @@ class SessionWriter:
             _prepare(connection, head, durable=cls.durable)
         except sqlite3.Error as error:
             connection.close()
-            for file in folder.glob(f"{schema.LIVE_FILE}*"):  # nothing is recorded in it
+            for file in folder.glob(f"{schema.LIVE_FILE}*"):  # nothing is recorded yet
                 file.unlink()
             _leave(folder)
             raise RecordingError(
@@ -118,9 +118,9 @@ class SessionWriter:
 
     @classmethod
     def open(cls, folder: Path, clock: Clock, *, reserve: int = 0) -> Self:
-        """Go on with the recording in `folder`, that was cut short: numbers of blocks and events continue.
+        """Continue the interrupted recording in `folder`: numbers of blocks and events continue.
 
-        Raises RecordingError when it is sealed, when somebody still writes it, or when it cannot be written.
+        Raises RecordingError when it is sealed, while another program uses it, or when it cannot be written.
         """
         if is_sealed(folder):
             raise RecordingError(f"{folder} is sealed: nothing is added to it; begin a new session")
@@ -151,16 +151,16 @@ class SessionWriter:
 
     @property
     def pending_count(self) -> int:
-        """Return how many readings were handed over and are not safe yet."""
+        """Return the number of readings handed over that are not safe yet."""
         return self.reading_count - self.acknowledged.readings
 
     def limit(self, size: int) -> None:
-        """Let the file grow to so many bytes, as on a disk that has no more room."""
+        """Limit the file to `size` bytes, as on a full disk."""
         (page,) = self._connection.execute("PRAGMA page_size").fetchone()
         self._connection.execute(f"PRAGMA max_page_count={size // page}")
 
     def readings(self, block: ReadingBlock) -> None:
-        """Take readings over; commits when the last commit lies a second back. Raises RecordingError when it cannot."""
+        """Take readings over; commit a second after the last commit. Raises RecordingError when writing fails."""
         self._check()
         if len(block):
             self._blocks.append(block)
@@ -177,14 +177,14 @@ class SessionWriter:
         time_ns: int | None = None,
         commit: bool = True,
     ) -> LoggedEvent:
-        """Write an event down after all readings handed over before it; on return both are safe.
+        """Write an event after all readings handed over before it; on return both are safe.
 
-        Without `commit` both wait for the next one. `time_ns` is now on the session clock. Raises RecordingError.
+        Without `commit` both wait for the next one. `time_ns` [session clock] is now by default. Raises RecordingError.
         """
         self._check()
         instant_ns = self.instant_ns(kind, trial) if time_ns is None else time_ns
         event = LoggedEvent(self._event_count + 1, instant_ns, kind, trial, self.reading_count, dict(data or {}))
-        schema.event_row(event)  # what JSON or UTF-8 cannot hold is refused here, before it spoils a commit
+        schema.event_row(event)  # data that JSON or UTF-8 cannot hold fail here, not in a commit
         self._events.append(event)
         self._event_count += 1
         if commit:
@@ -192,14 +192,14 @@ class SessionWriter:
         return event
 
     def instant_ns(self, _kind: str, _trial: int | None, /) -> int:
-        """Return the instant of an event for which none was given [ns, session clock]."""
+        """Return the instant of an event given without one [ns, session clock]."""
         return self.clock.now_ns()
 
     def commit(self) -> Acknowledged:
-        """Make all that was handed over safe, and say how much that is now.
+        """Commit everything handed over, and return how much is safe.
 
-        What was written is safe only in a file that can be found: where its name is gone or names another file, all of
-        it is written to a new folder, which is `folder` from then on, and `must_end` is set. Raises RecordingError.
+        Data are safe only in a file that can be found again. Where its name is gone or belongs to another file,
+        everything is written to a new folder, the new `folder`, and `must_end` is set. Raises RecordingError.
         """
         self._check()
         now_ns = self.clock.now_ns()
@@ -218,12 +218,12 @@ class SessionWriter:
         return self.acknowledged
 
     def close(self) -> None:
-        """Commit, fold the write-ahead log into the file and let go of it. Harmless when repeated."""
+        """Commit, fold the write-ahead log into the file and close it. Harmless when repeated."""
         try:
             if self._failure is None:
                 self.commit()
                 self._failure = "it was closed"
-                # Readers then need one file alone. Where folding the log into it fails, the log stays.
+                # Readers then need a single file. Where folding the log fails, the log stays.
                 with suppress(sqlite3.Error):
                     self._connection.execute("PRAGMA journal_mode=DELETE")
         finally:
@@ -231,7 +231,7 @@ class SessionWriter:
             release_reserve(self.folder)
 
     def _write_waiting(self) -> int:
-        """Write what waits in one transaction, and return the number of the last row of readings."""
+        """Write pending data in one transaction, and return the number of the last row of readings."""
         if not self._blocks and not self._events:
             return self._block_rows
         self._connection.execute("BEGIN IMMEDIATE")
@@ -247,7 +247,7 @@ class SessionWriter:
         return rows
 
     def _written_again(self, error: sqlite3.Error) -> int:
-        """Try a commit that failed once more: elsewhere, or in the room that was kept back."""
+        """Retry a failed commit: in another folder, or in the reserved space."""
         if self._lost_sight():
             self._rescue()
         elif self.must_end is not None or not (self.folder / RESERVE_FILE).exists():
@@ -267,7 +267,7 @@ class SessionWriter:
         return identities(self._path) != self._identities
 
     def _rescue(self) -> None:
-        """Go on in a new folder that holds all that the open file does. Raises RecordingError where none can be."""
+        """Continue in a new folder with a copy of the open file. Raises RecordingError where this fails."""
         path, self._failure = self._path, "it was removed, renamed or replaced"
         self._path = rescue(self._connection, path)
         self._connection.close()
@@ -283,11 +283,11 @@ class SessionWriter:
         )
 
     def give_back_reserve(self) -> None:
-        """Give the reserve back to the disk."""
+        """Release the reserve."""
         release_reserve(self.folder)
 
     def _insert_blocks(self) -> int:
-        """Insert the waiting readings in rows of at most LARGEST_BLOCK, and return the number of the last row."""
+        """Insert the pending readings in rows of at most LARGEST_BLOCK, and return the number of the last row."""
         rows = self._block_rows
         pending = ReadingBlock.concatenate(self._blocks)
         for start in range(0, len(pending), LARGEST_BLOCK):
@@ -307,21 +307,21 @@ class SessionWriter:
         raise schema.DiskRefused(f"{self._path}: {self._failure}", f"({error}); {remedy(error)}") from error
 
     def _check(self) -> None:
-        """Raise RecordingError when nothing can be written any more."""
+        """Raise RecordingError when the writer has failed or is closed."""
         if self._failure is not None:
             raise RecordingError(f"{self._path}: {self._failure}")
 
 
 class FleetingWriter(SessionWriter):
-    """Writes an invented session: nothing waits for the disk, so a power cut may lose all of it."""
+    """Writes a simulated or replayed session without waiting for the disk: a power cut may lose all of it."""
 
     durable = False
 
 
 def _leave(folder: Path) -> None:
-    """Remove what was made for a recording that cannot be begun."""
+    """Remove the reserve and empty folder of a recording that could not be begun."""
     release_reserve(folder)
-    with suppress(OSError):  # where something lies in it
+    with suppress(OSError):  # where it is not empty
         folder.rmdir()
 
 
@@ -340,7 +340,7 @@ def _prepare(connection: sqlite3.Connection, head: Mapping[str, str], *, durable
 
 
 def _make_durable(connection: sqlite3.Connection) -> None:
-    """Have every commit survive the end of the process and of the machine's power."""
+    """Make every commit survive a crash of the program and a power cut."""
     (mode,) = connection.execute("PRAGMA journal_mode=WAL").fetchone()
     if mode != "wal":
         raise sqlite3.OperationalError(f"the disk allows no write-ahead log, journal mode is {mode}")

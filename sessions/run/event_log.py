@@ -1,4 +1,4 @@
-"""How events and commands of a session are written into its log, and its course read back step by step.
+"""A session's events and commands as lines of its log, and the log read back as steps.
 
 `docs/session-format/events.md` lists the kinds.
 """
@@ -19,7 +19,7 @@ Line = tuple[str, int | None, dict[str, Any]]  # kind, number of the trial, data
 
 
 def kind_of(event: type[steps.Event]) -> str:
-    """Return the kind an event is logged as: its name in small letters, or the one that the file format has for it.
+    """Return the kind an event is logged as: its name in small letters, or the name that the file format has for it.
 
     >>> kind_of(steps.ContactOnset)
     'contact_onset'
@@ -28,27 +28,27 @@ def kind_of(event: type[steps.Event]) -> str:
 
 
 def data_of(event: steps.Event) -> dict[str, Any]:
-    """Return what an event holds as JSON can: numbers that are none become texts such as "nan"."""
+    """Return an event's data for JSON: nan and infinities become texts such as "nan"."""
     return cast("dict[str, Any]", _plain(msgspec.structs.asdict(event)))
 
 
 def event_of(entry: LoggedEvent) -> steps.Event | None:
     """Return the event that was logged; None for a line about a command, or about the recording itself.
 
-    Raises ValueError where the line does not hold what such an event has.
+    Raises ValueError where the line's data do not fit the event.
     """
     return None if entry.kind not in _EVENTS else event_from_data(entry.kind, entry.data)
 
 
 def event_from_data(kind: str, data: Mapping[str, Any]) -> steps.Event:
-    """Return the event of a kind that `data_of` gave `data` for. Raises ValueError where it is none."""
+    """Return the event of a kind from `data` of `data_of`. Raises ValueError where they do not fit."""
     if kind not in _EVENTS:
         raise ValueError(f"{kind} is no event of a session's course")
     return msgspec.convert(dict(data), _EVENTS[kind], strict=False)
 
 
 def line_of(command: steps.Command) -> Line | None:
-    """Return how a command is logged; None for one that leaves no trace of its own."""
+    """Return the log line of a command; None for a command that is not logged."""
     if (kind := _COMMANDS.get(type(command))) is not None:
         data = msgspec.structs.asdict(command)
         return kind, data.pop("trial", None), data
@@ -69,7 +69,7 @@ def line_of(command: steps.Command) -> Line | None:
             return None
 
 
-def _plain(value: Any) -> Any:  # noqa: ANN401  whatever an event holds
+def _plain(value: Any) -> Any:  # noqa: ANN401  any data of an event
     """Return plain data with every nan and infinity written as a text."""
     if isinstance(value, dict):
         return {name: _plain(content) for name, content in cast("dict[str, Any]", value).items()}
@@ -78,7 +78,7 @@ def _plain(value: Any) -> Any:  # noqa: ANN401  whatever an event holds
     return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
-_COMMANDS: dict[type[steps.Command], str] = {  # whose line holds all that the command does
+_COMMANDS: dict[type[steps.Command], str] = {  # whose line holds all fields of the command
     steps.StartTake: "take_started",
     steps.KeepTake: "take_kept",
     steps.DiscardTake: "take_discarded",
@@ -90,16 +90,16 @@ _RECORDED_AS: dict[type[steps.Event], str] = {steps.MagnitudeEstimate: "number_g
 _EVENTS: dict[str, type[steps.Event]] = {kind_of(event): event for event in get_args(steps.Event)}
 
 
-# What the runner notices comes of readings and clock, and is found in them once more. All else people do.
+# The runner derives these from readings and clock, in a replay too. All other events are acts of people.
 NOTICED = frozenset({"zeroed", "contact_onset", "finger_lifted", "settled", "rest_over"})
 _ACTS = _EVENTS.keys() - NOTICED
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One look of the runner at transducer and operator at which something happened."""
+    """One cycle of the runner in which something happened."""
 
-    readings: int  # handed over by then, from the beginning
+    readings: int  # handed over so far, from the beginning
     instant_ns: int  # session clock [ns]
     act: Event | None = None  # what somebody did then
     losses: LoggedEvent | None = None  # what was reported of lost and distrusted readings
@@ -108,7 +108,7 @@ class Step:
 
 
 def parts(events: Sequence[LoggedEvent]) -> tuple[tuple[LoggedEvent, ...], ...]:
-    """Return the log of a session in parts: a new one begins wherever it was resumed, with what was owed then."""
+    """Split the log of a session where it was resumed; a new part begins with the lines that were due then."""
     begins = [0]
     for i, event in enumerate(events):
         if event.kind == "resumed":
@@ -132,7 +132,7 @@ def steps_of(events: Sequence[LoggedEvent]) -> tuple[Step, ...]:
             history.append(Step(*point))
         elif event.kind == "losses" and not _at_the_end(events, i):
             history.append(Step(*point, losses=event))
-        elif event.kind == "told" and event.trial is not None:  # the machine's own words belong to no trial
+        elif event.kind == "told" and event.trial is not None:  # the machine's own messages have no trial
             history.append(Step(*point, zero_missing=True))
     if not history or history[-1].end is None:
         last_event = events[-1] if events else LoggedEvent(0, 0, "", None, 0, {})
@@ -141,6 +141,6 @@ def steps_of(events: Sequence[LoggedEvent]) -> tuple[Step, ...]:
 
 
 def _at_the_end(events: Sequence[LoggedEvent], position: int) -> bool:
-    """Say whether losses were reported while the session was being ended: then the end reports them once more."""
+    """Say whether losses were reported as the session ended: a replay's end reports them itself."""
     following = events[position + 1 : position + 2]
     return bool(following) and following[0].kind == "ended" and events[position].trial is None

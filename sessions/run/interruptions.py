@@ -17,12 +17,12 @@ class Interruptions:
         """Handle a signal."""
         self.pending = True
         if self._at_once:
-            self._at_once = False  # once: a second signal must not break the clearing up after the first
+            self._at_once = False  # once: a second signal must not interrupt the clean-up after the first
             raise KeyboardInterrupt
 
     @contextmanager
     def raise_at_once(self) -> Generator[None]:
-        """Let a signal raise KeyboardInterrupt at once inside, for work that may be cut short anywhere."""
+        """Let a signal raise KeyboardInterrupt immediately inside, for work that can stop anywhere."""
         self._at_once = True
         try:
             yield

@@ -1,7 +1,7 @@
-"""What is made of readings while they come: the zero of a take, touch and lift, and when the finger stays off.
+"""Live detection: the zero of a take, touch and lift, and when the finger stays off.
 
-Readings are never altered. The rule of a take: it begins with an unloaded stretch of at least `zero_duration`, so
-before any contact, and ends no earlier than `after_lift` seconds after the last lift.
+Readings are never altered. A take begins with an unloaded stretch of at least `zero_duration`, before any contact, and
+ends no earlier than `after_lift` seconds after the last lift.
 """
 
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class TakeWatch:
     frame: Frame
     zero_duration: float  # of the unloaded stretch [s]
     detection: DetectorSettings
-    after_lift: float = 0.5  # without a touch, when the finger stays off [s]
+    after_lift: float = 0.5  # time without a touch after which the finger counts as off [s]
 
     def __post_init__(self) -> None:
         """Begin to measure the zero."""
@@ -37,7 +37,7 @@ class TakeWatch:
         self._lifted: float | None = None  # when the finger left [s, device time]; None while it touches, or stayed off
 
     def feed(self, block: ReadingBlock) -> tuple[Noticed, ...]:
-        """Take readings and return what they tell, in order."""
+        """Process readings and return the events detected in them, in order."""
         if not len(block):
             return ()
         if self._detector is not None:
@@ -54,7 +54,7 @@ class TakeWatch:
         return (zero,)
 
     def _zero(self) -> Zeroed | None:
-        """Return the zero of the stretch once it is long enough and nothing moves in it."""
+        """Return the zero of the stretch once it is long enough and quiet."""
         stretch = self._stretch
         duration = float(stretch.time[-1] - stretch.time[0])
         normal = self._normal_force(stretch)

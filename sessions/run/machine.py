@@ -1,4 +1,4 @@
-"""The course of a session as a table of cases: state and event to state and commands. It does nothing itself."""
+"""The state machine of a session, without side effects: state and event to next state and commands."""
 
 from dataclasses import replace
 
@@ -38,7 +38,7 @@ def start(plan: SessionPlan) -> Step:
 
 
 def advance(state: State, event: steps.Event) -> Step:
-    """Return the next state and the commands that enter it; an event that is not meant now is refused."""
+    """Return the next state and the commands that enter it; an event that does not fit the state is refused."""
     match state, event:
         case Ended(), _:
             return state, (_refusal(state, event),)
@@ -67,10 +67,10 @@ def advance(state: State, event: steps.Event) -> Step:
 
 
 def resume_interrupted(state: State, reason: str) -> Step:
-    """Return the state in which a session that was cut short goes on, and the commands that enter it.
+    """Return the state in which an interrupted session continues, and the commands that enter it.
 
-    It goes on at the same trial. A take that was open is discarded for `reason`: nobody knows what came after its last
-    reading. A pause or a rest is over. The second of two that are compared begins with the first again.
+    It continues at the same trial. An open take is discarded for `reason`: nobody knows what followed its last reading.
+    A pause or a rest is over. The second of two compared trials begins again with the first.
     """
     match state:
         case Idle():
@@ -150,7 +150,7 @@ def _take_answer(state: Scoring, answer: AnswerEvent) -> Step:
 
 
 def _pause_or_resume(state: State, event: steps.Pause | steps.Resume | steps.RestOver) -> Step:
-    """Stop asking, and go on where it is safe: the stimulus is confirmed and the zero measured anew."""
+    """Pause the session, or continue it: the stimulus is confirmed and the zero measured again."""
     match state, event:
         case Scoring(position, strokes=strokes), steps.Pause():
             return Paused(position, scoring=True, strokes=strokes), ()
@@ -169,7 +169,7 @@ def _pause_or_resume(state: State, event: steps.Pause | steps.Resume | steps.Res
 
 
 def _redo_or_undo(state: State, event: steps.Redo | steps.UndoRedo) -> Step:
-    """Repeat a trial, or undo that; a redo that discards no whole stroke cannot be undone."""
+    """Repeat a trial, or undo the last redo; a redo that discards no whole stroke cannot be undone."""
     if isinstance(event, steps.UndoRedo):
         return _redo_undone(state)
     next_state, commands = _repeat(state, event.reason)
@@ -180,7 +180,7 @@ def _redo_or_undo(state: State, event: steps.Redo | steps.UndoRedo) -> Step:
 
 
 def _repeat(state: State, reason: str) -> Step:
-    """Repeat the trial in hand, or the one before where none is in hand yet; the order after it stays as it was."""
+    """Repeat the trial in hand, or the previous one before it begins; the later order is unchanged."""
     match state:
         case Taring(position) | Ready(position) | Stroking(position) | Scoring(position) | Settling(position):
             if position.trial.compared_with is not None:
@@ -199,7 +199,7 @@ def _repeat(state: State, reason: str) -> Step:
 
 
 def _redo_undone(state: State) -> Step:
-    """Return to where the last redo came from: what it discarded is restored, what was left out is left out again."""
+    """Return to the state before the last redo: its discarded takes are restored, skipped trials are skipped again."""
     match state:
         case Mounting(position) | Taring(position) | Ready(position) if position.before_redo is not None:
             previous = position.before_redo
@@ -251,7 +251,7 @@ def _leave_out(state: State, reason: str) -> Step:
 
 
 def _begin_take(position: Position) -> Step:
-    """Open the next take of the trial in hand, its stimulus being on."""
+    """Open the next take of the trial in hand, whose stimulus is mounted."""
     position = position.with_take(position.progress[position.index].takes + 1)
     start_take = steps.StartTake(position.trial.number, position.take)
     if position.plan.forces:
@@ -260,7 +260,7 @@ def _begin_take(position: Position) -> Step:
 
 
 def _stroke_over(position: Position) -> Step:
-    """Ask for the answer; where none is due the take ends, once the finger has been off for a moment."""
+    """Ask for the answer; if none is due, the take ends once the finger has been off for a moment."""
     if position.trial.answer != "none":
         return Scoring(position), (_ask_answer(position),)
     return (Settling(position), ()) if position.plan.forces else _keep_take(position)
@@ -279,7 +279,7 @@ def _return_to(position: Position, reason: str) -> Step:
 
 
 def _undo_pair(position: Position, reason: str) -> tuple[Position, tuple[steps.Command, ...]]:
-    """Return to the first of two that are compared, its take discarded; any other position stays as it is, not kept."""
+    """Return to the first of two compared trials and discard its take; any other position is marked as not kept."""
     if position.trial.compared_with is None:
         return position.with_take(position.take), ()
     first = position.with_take(position.take).at(position.index - 1)
@@ -287,7 +287,7 @@ def _undo_pair(position: Position, reason: str) -> tuple[Position, tuple[steps.C
 
 
 def _undo_commands(position: Position, reason: str) -> tuple[steps.Command, ...]:
-    """Return the command that discards the take that was kept of the trial in hand, where one was."""
+    """Return the command that discards the kept take of the trial in hand, if there is one."""
     has_kept_take = position.progress[position.index].kept
     return (steps.DiscardTake(position.trial.number, position.take, reason),) if has_kept_take else ()
 
@@ -321,7 +321,7 @@ def _ask_answer(position: Position) -> steps.Command:
 
 
 def _discard_commands(state: State, reason: str) -> tuple[steps.Command, ...]:
-    """Return the command that discards the take that is open, where one is."""
+    """Return the command that discards the open take, if there is one."""
     if isinstance(state, OpenTake) or (isinstance(state, Paused) and state.scoring):
         return (steps.DiscardTake(state.position.trial.number, state.position.take, reason),)
     return ()

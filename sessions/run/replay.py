@@ -1,4 +1,4 @@
-"""A recorded session goes through the same course once more, from its readings and from what people did."""
+"""Replay of a recorded session through the same machine, from its readings and the acts of people."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -26,7 +26,7 @@ from sessions.run.runner import STOPPED_BY_USER, Continuation, Ending, RunnerSet
 from sessions.run.steps import Command, Event
 
 SLICE = 0.02  # longest wait before a stop is noticed [s]
-_PART = 16_384  # readings written at once
+_PART = 16_384  # readings in one write
 Progress = Callable[[float, str], None]  # part done (0 to 1), what is happening
 
 
@@ -35,11 +35,11 @@ class Stopped(Exception):
 
 
 def replay(recording: Recording, folder: Path, speed: float | None, progress: Progress) -> Recording:
-    """Run a recorded session once more into `folder`, `speed` times as fast as it was (None: as fast as can be).
+    """Run a recorded session again into `folder`, `speed` times as fast as it was (None: as fast as possible).
 
-    An imported recording has no course: its readings are handed over once more, at once, and its events written again.
-    A session that was resumed is run part by part, as it was; where its readings were joined is taken from its log.
-    Raises Stopped on Ctrl-C, RecordingError when the folder takes no more.
+    An imported recording has no session: its readings are copied without pauses, and its events written again. A
+    resumed session is replayed part by part; where its readings were joined is taken from its log. Raises Stopped on
+    Ctrl-C, RecordingError when nothing more can be written.
     """
     clock = _RecordedClock(recording)
     writer = _Rewriter.create(
@@ -59,7 +59,7 @@ def replay(recording: Recording, folder: Path, speed: float | None, progress: Pr
 
 
 def different_events(first: Recording, second: Recording) -> Iterator[str]:
-    """Yield a sentence for each event that came out otherwise, is new, or came no more."""
+    """Yield a sentence for each event that differs, is new, or is missing."""
     log, replay_log = ([e for e in recording.events if e.kind not in TELL_LOSSES] for recording in (first, second))
     kinds, replay_kinds = ([(event.kind, event.trial) for event in events] for events in (log, replay_log))
     for operation, i, i_end, k, k_end in SequenceMatcher(None, kinds, replay_kinds, autojunk=False).get_opcodes():
@@ -72,14 +72,14 @@ def different_events(first: Recording, second: Recording) -> Iterator[str]:
 
 
 def different_readings(first: Recording, second: Recording) -> Iterator[str]:
-    """Yield a sentence for each column of the readings that is not what it was."""
+    """Yield a sentence for each column of the readings that differs."""
     yield from different(digest_of(first.blocks(), ()), digest_of(second.blocks(), ()))
 
 
 class _Rewriter(FleetingWriter):
-    """Writes a replay: each event has the instant at which it was recorded, for a replay makes no time of its own.
+    """Writes a replay: each event keeps its recorded instant.
 
-    A recording that was cut short is cut short here too, and the disk is not waited for: nothing can be lost.
+    A recording that was cut short is cut short here too. Nothing waits for the disk: no data can be lost.
     """
 
     def follow(self, recording: Recording) -> None:
@@ -93,13 +93,13 @@ class _Rewriter(FleetingWriter):
 
     def follow_part(self, log: Sequence[LoggedEvent]) -> None:
         """Take the instants from the log of a part, which may have been cut short."""
-        super().commit()  # a part begins with all that came before acknowledged
+        super().commit()  # a part begins with all earlier data acknowledged
         self._log = log
         self._is_cut_short = not any(event.kind == "ended" for event in log)
         self._next_event = 0
 
     def instant_ns(self, kind: str, trial: int | None, /) -> int:
-        """Return when such an event was recorded next. Raises _CutShort where the recording ends without an end."""
+        """Return the instant of the next such event. Raises _CutShort where the recording stops without an end."""
         if self._is_cut_short and (kind == "ended" or self._next_event == len(self._log)):
             raise _CutShort("the recording was cut short here")
         following = range(self._next_event, len(self._log))
@@ -114,10 +114,10 @@ class _Rewriter(FleetingWriter):
         return super().commit() if self._closing or self.pending_count >= _PART else self.acknowledged
 
     def close(self) -> None:
-        """Wait: what ended may have been resumed."""
+        """Leave it open: a resumed part may follow."""
 
     def finish(self) -> None:
-        """Write down what sealing said of a torn log, and close."""
+        """Write the events on a torn log, or on an incomplete restoration, and close."""
         self._closing = True
         self._is_cut_short, self._log = False, ()
         for event in self._later:
@@ -126,7 +126,7 @@ class _Rewriter(FleetingWriter):
 
 
 class _CutShort(RecordingError):
-    """The recording ends here, without an end."""
+    """The recording stops here, without an end."""
 
 
 class _ReplayedError(Exception):
@@ -134,7 +134,7 @@ class _ReplayedError(Exception):
 
 
 class _RecordedClock(StillClock):
-    """The session clock of the recording: it stands where the last step was, and nobody waits for it."""
+    """The session clock of the recording: it shows the instant of the last step, and waiting takes no time."""
 
     def __init__(self, recording: Recording) -> None:
         super().__init__(recording.events[0].time_ns if recording.events else 0)
@@ -147,9 +147,9 @@ class _RecordedClock(StillClock):
 
 @dataclass(eq=False)
 class _Player:
-    """Transducer, experimenter and subject of a part of a recording. One look of the runner is one step of the log.
+    """Plays transducer, experimenter and subject of a part of a recording. One cycle of the runner is one step.
 
-    It plays the part whose log is `log`, its readings from where `readings` stands up to number `limit`.
+    The part has the log `log` and the readings from the position of `readings` up to number `limit`.
     """
 
     transducer: TransducerInfo | None
@@ -158,7 +158,7 @@ class _Player:
     limit: int | None
     clock: _RecordedClock
     settings: RunnerSettings
-    speed: float | None  # of the recording's time; None: as fast as it goes
+    speed: float | None  # of the recording's time; None: as fast as possible
     progress: Progress
 
     def __post_init__(self) -> None:
@@ -178,10 +178,10 @@ class _Player:
         return self._next == len(self._steps)
 
     def go_on(self) -> Ending | None:
-        """Take the next step when its time has come, and say why the session is to be ended in it."""
+        """Take the next step once it is due, and return why the session ends in it; None where it does not."""
         self._step = None
         if self.at_end:
-            return "stopped", STOPPED_BY_USER  # the course went another way, and waits for what never comes
+            return "stopped", STOPPED_BY_USER  # the replay differs, and waits for an event that never comes
         step = self._steps[self._next]
         if self._wait_for(step):
             return None
@@ -199,10 +199,10 @@ class _Player:
     # ---- as an operator
 
     def show(self, command: Command) -> None:
-        """Take a command: what was done about it is known."""
+        """Ignore a command: the response to it is recorded."""
 
     def poll(self) -> Sequence[Event]:
-        """Return what was done in this step."""
+        """Return the act of people in this step, if any."""
         step = self._step
         if step is None:
             return ()
@@ -229,7 +229,7 @@ class _Player:
         """Begin."""
 
     def read(self, timeout: float) -> ReadingBlock:  # noqa: ARG002  nothing is waited for
-        """Return the readings of this step; once stopped, all that are left."""
+        """Return the readings of this step; once stopped, all that remain."""
         step = self._step
         if self._stopped:
             return self.readings.up_to(self.limit)
@@ -247,17 +247,17 @@ class _Player:
         return self.readings.up_to(step.readings)
 
     def stop(self) -> None:
-        """End: the health at the end is known where the recording has one."""
+        """Stop; the health is then the recorded one, where the recording has an end."""
         self._stopped = True
         end = self._steps[-1].end
         if end:
             self._health = msgspec.convert(end.get("health", {}), Health)
 
     def close(self) -> None:
-        """Give back nothing."""
+        """Release nothing."""
 
     def _wait_for(self, step: Step) -> bool:
-        """Wait a little for a step whose time has not come, and say so."""
+        """Wait for a step, at most `SLICE` seconds, and say whether it is still not due."""
         if self.speed is None:
             return False
         due = self._began + (step.instant_ns - self._first_ns) * 1e-9 / self.speed
@@ -267,7 +267,7 @@ class _Player:
         return remaining_s > SLICE
 
     def _move_past(self, kind: str, step: Step, interval: float) -> None:
-        """Go on to the step, and so far that the runner, which reports such things now and then, repeats it."""
+        """Move the clock to the step, and far enough after the last such report that the runner makes another."""
         last_ns = self._said_ns.get(kind)
         instant = step.instant_ns if last_ns is None else max(step.instant_ns, last_ns + round(interval * 1e9))
         self.clock.move(instant)
@@ -275,7 +275,7 @@ class _Player:
 
 
 def recorded_settings(log: Sequence[LoggedEvent]) -> RunnerSettings:
-    """Return how a session, or a part of it, was run, as its log says; what the log lacks is as it is now."""
+    """Return the settings recorded in the log of a session or a part; the defaults where it has none."""
     for event in log:
         if event.kind in ("started", "resumed"):
             settings = event.data["settings"] if event.kind == "started" else event.data["run"]
@@ -307,7 +307,7 @@ def _run(
 
 def _run_part(plan: SessionPlan, player: _Player, writer: _Rewriter, continuation: Continuation | None) -> None:
     transducer, settings = player if plan.forces else None, player.settings
-    with suppress(_CutShort, _ReplayedError):  # as the part ends
+    with suppress(_CutShort, _ReplayedError):  # these end a part
         end = run_session(plan, writer, player, transducer, settings=settings, resumed=continuation, stop=player.go_on)
         if end.cause == "stopped" and not player.at_end:
             raise Stopped
@@ -334,7 +334,7 @@ class _RecordedSeam(Seam):
 
 
 def _copy(recording: Recording, writer: _Rewriter) -> None:
-    """Hand the readings over once more, and write each event where it stood."""
+    """Copy the readings, and write each event at its position among them."""
     writer.follow_part([event for event in recording.events if event.kind not in TELL_LOSSES])
     readings = RecordedReadings(recording.blocks())
     for event in recording.events:

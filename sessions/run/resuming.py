@@ -1,4 +1,4 @@
-"""A session that was cut short goes on: where it was, by its log; and how the new clock and readings join the old."""
+"""Resuming an interrupted session: its state from its log, and how the new clock and readings join the old."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,13 +23,13 @@ from sessions.run.steps import Command, Refuse
 CUT_SHORT = "the recording was cut short in the middle of it"
 OF_TAKES = frozenset({"take_started", "take_kept", "take_discarded", "take_restored", "left_out"})
 RESUMABLE = frozenset({"device", "client", "disk"})  # causes of an end that cut a session short
-CLOCKS_AGREE = 1.0  # wall clock and session clock drift apart by less within a session [s]
-LEAST_GAP_NS = 1_000_000  # where the wall clock shows none: the session clock never stands still or runs backwards
+CLOCKS_AGREE = 1.0  # largest drift between wall clock and session clock within a session [s]
+LEAST_GAP_NS = 1_000_000  # where the wall clock shows no gap: the session clock always advances
 
 
 @dataclass(frozen=True, slots=True)
 class Resumption:
-    """Where a session that was cut short goes on."""
+    """Where an interrupted session continues."""
 
     state: State
     due_lines: tuple[Line, ...]  # about takes: decided, or now due, and not in the log yet
@@ -37,7 +37,7 @@ class Resumption:
 
 
 def resumption(plan: SessionPlan, events: Sequence[LoggedEvent]) -> Resumption:
-    """Return where a session with this log goes on: at the same trial, its open take discarded.
+    """Return where a session with this log continues: at the same trial, its open take discarded.
 
     Raises RecordingError where an event does not follow from those before it.
     """
@@ -68,7 +68,7 @@ def resumption(plan: SessionPlan, events: Sequence[LoggedEvent]) -> Resumption:
 
 
 def check_resumable(recording: Recording) -> None:
-    """Raise RecordingError unless the session was cut short, its log is whole and its clock can go on."""
+    """Raise RecordingError unless the session was cut short, its log is whole and its clock can be continued."""
     folder, end = recording.folder, recording.end
     seals = "" if is_sealed(folder) else f"; 'daq-app resume {folder} --end' seals it"
     if not recording.log_is_whole:
@@ -80,7 +80,7 @@ def check_resumable(recording: Recording) -> None:
 
 
 def check_same_transducer(original: TransducerInfo | None, present: TransducerInfo | None) -> None:
-    """Raise RecordingError unless the transducer is the one the session began with, set and calibrated alike."""
+    """Raise RecordingError unless the transducer is the session's, with the same calibration and rate."""
     if original is None or present is None:
         if original is not present:
             raise RecordingError("the session began without a transducer, or is to go on without its own")
@@ -92,7 +92,7 @@ def check_same_transducer(original: TransducerInfo | None, present: TransducerIn
         )
     if calibration_hash(present.calibration) != calibration_hash(original.calibration):
         raise RecordingError(f"transducer {present.serial} is calibrated otherwise than before; begin a new session")
-    # A device that counts no ticks of its own has its rate measured when it is opened, good to a few per cent.
+    # The rate of a device without a counter is measured on opening, to a few per cent.
     tolerance = SPREAD if np.isnan(original.counter_rate) else 1e-3
     if not np.isclose(present.rate, original.rate, rtol=tolerance, equal_nan=True):
         raise RecordingError(
@@ -103,7 +103,7 @@ def check_same_transducer(original: TransducerInfo | None, present: TransducerIn
 
 @dataclass(frozen=True, slots=True)
 class ContinuedClock:
-    """A clock that goes on where the session's clock was."""
+    """A clock that continues the session's clock."""
 
     clock: Clock
     offset_ns: int  # added to the clock's time [ns]
@@ -125,10 +125,10 @@ class ContinuedClock:
 def continue_clock(
     recording: Recording, last_block: ReadingBlock, clock: Clock, date: datetime
 ) -> tuple[ContinuedClock, dict[str, Any]]:
-    """Return a clock that continues the session's, and what the event `resumed` records of the gap between.
+    """Return a clock that continues the session's, and the gap as the event `resumed` records it.
 
-    `last_block` holds the last readings (or none). The session clock goes on from its last instant by as much as the
-    wall clock, now at `date`, says has passed, a second more or less: no two clocks of a computer survive its restart.
+    `last_block` holds the last readings (or none). The session clock advances from its last instant by the time that
+    the wall clock, now at `date`, shows, to about a second: no other clock survives a restart of the computer.
     """
     clock_readings = [(str(recording.provenance["created_utc"]), int(recording.provenance["clock"]["now_ns"]))]
     resumptions = (e.data for e in recording.events if e.kind == "resumed")
@@ -137,7 +137,7 @@ def continue_clock(
     instants = [at_ns, *(event.time_ns for event in recording.events), *last_block.received_ns.tolist()]
     last_ns = max(instants)
     elapsed_ns = round((date - datetime.fromisoformat(utc)).total_seconds() * 1e9)
-    # A simulated clock ran faster; while nothing ran, time passed as on the wall.
+    # A simulated clock ran faster; in the gap, time passed as on the wall clock.
     gap_ns = elapsed_ns - round((last_ns - at_ns) / float(recording.provenance["clock"]["factor"]))
     offset_ns = last_ns + max(gap_ns, LEAST_GAP_NS) - clock.now_ns()  # as `_clock_at_resumption` reads it again
     duration = gap_ns * 1e-9 if gap_ns * 1e-9 > -CLOCKS_AGREE else None
@@ -157,16 +157,16 @@ def _clock_at_resumption(data: Mapping[str, Any]) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Seam:
-    """What is added to readings after a resumption, so that their numbers and times go on from those before."""
+    """Offsets with which numbers and times of readings after a resumption continue those before it."""
 
     sequence_offset: int
     time_offset: float  # [s]
 
     @staticmethod
     def between(old: ReadingBlock, new: ReadingBlock) -> "Seam":
-        """Return the seam of the last readings before and the first after it; the time between is the session clock's.
+        """Return the seam of the last readings before and the first after; the gap is taken from the session clock.
 
-        A seam after no reading adds nothing.
+        Without old readings the offsets are zero.
         """
         if not len(old):
             return Seam(0, 0.0)
@@ -179,7 +179,7 @@ class Seam:
 
 
 def resumed_data(gap: Mapping[str, Any], info: TransducerInfo | None, software: Mapping[str, str]) -> dict[str, Any]:
-    """Return what the event `resumed` holds."""
+    """Return the data of the event `resumed`."""
     return {
         **gap,
         "uri": None if info is None else info.uri,

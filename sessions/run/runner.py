@@ -26,10 +26,10 @@ Ending = tuple[Cause, str]  # why a session ends, for programs and for people
 
 
 class Operator(Protocol):
-    """Experimenter and subject, as the runner sees them: a terminal, a window, or simulated ones. No call waits."""
+    """Experimenter and subject, as the runner sees them: a terminal, a window, or a simulation. No call blocks."""
 
     def show(self, command: Command) -> None:
-        """Take a command; those that ask for something are answered through `poll` when it is done."""
+        """Take a command; `poll` later returns the event that answers it, if it asks for one."""
 
     def poll(self) -> Sequence[Event]:
         """Return what has happened since the last call, in order."""
@@ -39,10 +39,10 @@ class Operator(Protocol):
 class RunnerSettings:
     """How a session is run; written into its log."""
 
-    tick: float = 0.02  # between two looks at transducer and operator [s, session clock]
+    tick: float = 0.02  # between two polls of transducer and operator [s, session clock]
     zero_duration: float = 0.5  # unloaded stretch before each take [s, device time]
-    zero_patience: float = 5.0  # waiting for it, until a message says so [s, session clock]
-    after_lift: float = 0.5  # the finger stays off, before a take ends [s, device time]
+    zero_patience: float = 5.0  # wait for a zero, before a message [s, session clock]
+    after_lift: float = 0.5  # finger off, before a take ends [s, device time]
     losses_every: float = 1.0  # least time between two reports of lost readings [s, session clock]
     status_every: float = 0.1  # between two calls of `progress` [s, session clock]
     detection: DetectorSettings = field(default_factory=DetectorSettings)  # of the live detector, and of a quiet zero
@@ -60,7 +60,7 @@ class Continuation:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """How far a running session is, for a lamp or a line of progress."""
+    """Progress of a running session, for display."""
 
     state: str  # name of the machine's state
     trial: int | None  # number of the trial in hand
@@ -73,7 +73,7 @@ class Status:
 
 @dataclass(frozen=True, slots=True)
 class SessionEnd:
-    """How a session ended; the same stands in its log."""
+    """How a session ended; also written to its log."""
 
     reason: str
     cause: Cause
@@ -95,10 +95,10 @@ def run_session(
 ) -> SessionEnd:
     """Run the session to its end on the writer's clock, record all of it, and close the writer.
 
-    The session ends when the machine does, when `stop` gives a reason or Ctrl-C is pressed, and when the transducer is
-    lost: each time with a written end that names the reason. With `resumed` a session that was cut short goes on. The
-    transducer is started and stopped, not closed. Raises RecordingError when the disk takes no more; any other error
-    of ours is raised again after the end was written.
+    The session ends with the machine, when `stop` returns a reason, on Ctrl-C, and when the transducer is lost; its log
+    then names the reason. With `resumed` an interrupted session continues. The transducer is started and stopped, not
+    closed. Raises RecordingError when writing fails; any other error of the program is raised again after the end was
+    written.
     """
     if plan.forces != (transducer is not None):
         raise ValueError("a visit with forces needs a transducer, and one without has none")
@@ -109,7 +109,7 @@ def run_session(
 
 @dataclass(eq=False)
 class _Run:
-    """The one thing that changes while a session runs."""
+    """The mutable state of a running session."""
 
     plan: SessionPlan
     writer: SessionWriter
@@ -131,7 +131,7 @@ class _Run:
         self._rested_ns: int | None = None  # when the rest is over [session clock]
 
     def to_the_end(self, interruption: Interruptions, stop: Callable[[], Ending | None]) -> SessionEnd:
-        """Run, and write the end whatever it was."""
+        """Run, and write the end, except where the recording itself fails."""
         try:
             self._write_beginning()
             if self.transducer is not None:
@@ -153,7 +153,7 @@ class _Run:
         return self._end(cause, reason)
 
     def _write_beginning(self) -> None:
-        """Write down how the session is run; of one that goes on also the gap, and the take that was open."""
+        """Write the settings; for a resumed session also the gap and the fate of the open take."""
         settings = {"settings": _with_origin(self.settings)}
         if self.resumed is None:
             self.writer.event("started", data=settings)
@@ -163,7 +163,7 @@ class _Run:
         self.writer.event("resumed", data={**self.resumed.data, "run": settings["settings"]})
 
     def _go_round(self, stop: Callable[[], Ending | None]) -> Ending:
-        """Look at transducer and operator again and again, until there is a reason to end."""
+        """Poll transducer and operator until there is a reason to end."""
         self._carry_out(self._first_commands)
         while True:
             began_ns = self.clock.now_ns()
@@ -183,9 +183,9 @@ class _Run:
             self.clock.sleep(max(self.settings.tick - (self.clock.now_ns() - began_ns) * 1e-9, 0.0))
 
     def _listen(self) -> None:
-        """Record what the transducer gives, and pass on what it shows to the machine."""
+        """Record the transducer's readings, and pass the events detected in them to the machine."""
         if self.transducer is None:
-            self.writer.readings(ReadingBlock.empty())  # the disk is asked every second all the same
+            self.writer.readings(ReadingBlock.empty())  # the disk is still checked every second
             return
         block = self._going_on(self.transducer.read(self.settings.tick))
         self.writer.readings(block)
@@ -199,7 +199,7 @@ class _Run:
         self._report_losses()
 
     def _going_on(self, block: ReadingBlock) -> ReadingBlock:
-        """Return readings so that their numbers and times follow those before a resumption."""
+        """Return readings with numbers and times that continue those before a resumption."""
         if self.resumed is None or not len(block):
             return block
         if self._seam is None:
@@ -208,7 +208,7 @@ class _Run:
         return self._seam.join(block)
 
     def _take(self, event: Event) -> None:
-        """Let the machine decide about an event, write both down, then show what it asks for."""
+        """Pass an event to the machine, write event and commands, then carry the commands out."""
         previous, kind = self._state, kind_of(type(event))
         self._state, commands = advance(previous, event)
         refusals = [command for command in commands if isinstance(command, Refuse)]
@@ -219,14 +219,14 @@ class _Run:
             return
         entry = self.writer.event(kind, trial_in_hand(previous), data_of(event), commit=False)
         for command in commands:
-            if isinstance(command, AskRest):  # reckoned from the event it follows, whose instant a replay knows
+            if isinstance(command, AskRest):  # counted from its event, whose instant a replay knows
                 self._rested_ns = None if command.duration is None else entry.time_ns + round(command.duration * 1e9)
         if isinstance(event, UndoRedo) or not isinstance(self._state, OpenTake):
             self._watch = None
         self._carry_out(commands)
 
     def _carry_out(self, commands: Sequence[Command]) -> None:
-        """Write commands down, make that safe, and only then let anybody see them."""
+        """Write and commit commands before anybody sees them."""
         self._write(commands)
         self.writer.commit()
         for command in commands:
@@ -246,7 +246,7 @@ class _Run:
         self._due_ns["zero"] = self.clock.now_ns() + round(settings.zero_patience * 1e9)
 
     def _report_losses(self, *, immediately: bool = False) -> None:
-        """Write down what the driver lost, repeated or found wrong since the last report."""
+        """Log the readings that the driver lost, repeated or flagged since the last report."""
         if self.transducer is None:
             return
         health = self.transducer.health
@@ -264,7 +264,7 @@ class _Run:
             self._reported = health
 
     def _due(self, name: str, interval: float) -> bool:
-        """Say whether it is time for something, and when it is, set the next time."""
+        """Say whether a timer is due; if so, set its next time."""
         now_ns = self.clock.now_ns()
         if now_ns < self._due_ns[name]:
             return False
@@ -288,7 +288,7 @@ class _Run:
         )
 
     def _end(self, cause: Cause, reason: str) -> SessionEnd:
-        """Stop the stream, keep its last readings, write the end, and close the writer even where that fails."""
+        """Stop the stream, record its last readings, write the end, and close the writer in any case."""
         with closing(self.writer):
             health = self._last_readings()
             if not isinstance(self._state, Ended):
@@ -304,7 +304,7 @@ class _Run:
         if self.transducer is None:
             return Health()
         self.transducer.stop()
-        with suppress(LinkLost, DeviceFault):  # all that had arrived was handed over before it says so
+        with suppress(LinkLost, DeviceFault):  # raised only after all readings that arrived were handed over
             while len(block := self._going_on(self.transducer.read(0.0))):
                 self.writer.readings(block)
         return self.transducer.health

@@ -1,4 +1,4 @@
-"""Where a session is: the states of its course, and the position in the plan that each of them stands at."""
+"""The states of a session, and the position in the plan that each state holds."""
 
 from dataclasses import dataclass, replace
 from itertools import accumulate, chain, islice
@@ -11,12 +11,12 @@ from sessions.plan.plan import Block, Choice, SessionPlan, Stimulus, Trial
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far one trial is."""
+    """Progress of one trial."""
 
     takes: int = 0  # begun so far
-    take: int = 0  # number of the one in hand, or in hand last
-    kept: bool = False  # True when that one counts
-    choice: Choice | None = None  # given in that one, of the two compared
+    take: int = 0  # number of the present or latest one
+    kept: bool = False  # True when that take counts
+    choice: Choice | None = None  # given in that take, of the two compared
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class Position:
     plan: SessionPlan
     index: int  # of the trial in hand
     progress: tuple[Progress, ...]  # one for each trial of the plan
-    before_redo: "State | None" = None  # to which a redo can be undone, until the next stroke
+    before_redo: "State | None" = None  # restored by undoing the last redo, until the next stroke
 
     @property
     def trial(self) -> Trial:
@@ -63,12 +63,12 @@ class Position:
         position = block.trials.index(trial)
         if position == 0:
             return rests.between_blocks and self.at(self.index - 1).block.phase != "practice"
-        # Two that are compared make one trial in the subject's eyes.
+        # For the subject, two compared stimuli are one trial.
         number = sum(earlier.compared_with is None for earlier in block.trials[:position])
         return rests.after_trials is not None and number % rests.after_trials == 0
 
     def at(self, index: int) -> "Position":
-        """Return the position with another trial in hand, to which no redo has led."""
+        """Return the position with another trial in hand, not reached by a redo."""
         return replace(self, index=index, before_redo=None)
 
     def successor(self) -> "Position":
@@ -78,7 +78,7 @@ class Position:
 
     @property
     def answers(self) -> tuple[tuple[Stimulus, bool], ...]:
-        """Return what was compared with the standard of this block, and whether it was chosen, where a take counts."""
+        """Return each stimulus compared with this block's standard in a take that counts, and whether it was chosen."""
         trials = self.plan.trials
         block = trials[self.index].block
         stimuli: list[tuple[Stimulus, bool]] = []
@@ -89,11 +89,11 @@ class Position:
         return tuple(stimuli)
 
     def with_take(self, take: int) -> "Position":
-        """Return the position with this take of the trial in hand, the latest or an earlier one; it does not count."""
+        """Return the position with this take of the trial in hand, the latest or an earlier one; it is not kept."""
         return self.with_progress(Progress(max(take, self.progress[self.index].takes), take))
 
     def with_progress(self, progress: Progress) -> "Position":
-        """Return the position with the trial in hand that far."""
+        """Return the position with new progress of the trial in hand."""
         return replace(self, progress=(*self.progress[: self.index], progress, *self.progress[self.index + 1 :]))
 
 
@@ -132,7 +132,7 @@ class Scoring(_State, frozen=True):
 
 
 class Settling(_State, frozen=True):
-    """All of the trial is done; the take runs on until the finger has been off for a moment."""
+    """The trial is done; the take continues until the finger has been off for a moment."""
 
     touching: bool = False
 
@@ -142,7 +142,7 @@ class Resting(_State, frozen=True):
 
 
 class Paused(_State, frozen=True):
-    """Nothing is asked of anybody. No take is open, but for one whose stroke is done and waits for its answer."""
+    """The session pauses. No take is open, except one whose stroke is done and waits for its answer."""
 
     scoring: bool
     strokes: int = 1  # begun in the take that waits

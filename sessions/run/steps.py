@@ -1,4 +1,4 @@
-"""What may happen in the course of a session, what is to be done, and what a subject may answer. All of it is data."""
+"""Events and commands of a session, and the answers of a subject, all plain data."""
 
 import math
 from itertools import pairwise
@@ -7,7 +7,7 @@ from msgspec import Struct
 
 from sessions.plan.plan import Answer, Block, Choice, Hand, Trial
 
-# ---- what may happen
+# ---- events
 
 
 class Begin(Struct, frozen=True):
@@ -51,7 +51,7 @@ class FingerLifted(_Detection, frozen=True):
 class Settled(Struct, frozen=True):
     """The finger has been off for a moment since the last lift, so that the take may end."""
 
-    time: float = 0.0  # of the reading at which it had [s, device time]
+    time: float = 0.0  # of the reading at which this was certain [s, device time]
 
 
 class StrokeDone(Struct, frozen=True):
@@ -59,10 +59,10 @@ class StrokeDone(Struct, frozen=True):
 
 
 class Scored(Struct, frozen=True):
-    """The subject has judged on the line. What an input device cannot tell is empty or None."""
+    """The subject has judged on the line. What an input device does not report is empty or None."""
 
     score: float | None  # 0 to 100; None: the subject gave no answer
-    positions: tuple[tuple[float, float], ...] = ()  # every one on the line: (session clock [s], 0 to 100), in order
+    positions: tuple[tuple[float, float], ...] = ()  # each one on the line: (session clock [s], 0 to 100), in order
     first_touch: float | None = None  # session clock [s]
     corrections: int | None = None  # how often the subject changed an answer given
     hand: Hand | None = None  # that answered
@@ -102,15 +102,15 @@ class _WithReason(Struct, frozen=True):
 
 
 class Redo(_WithReason, frozen=True):
-    """The trial in hand is to be done again, or just before it begins the one before it; of two compared, both."""
+    """Repeat the trial in hand, or the previous one just before it begins; of two compared trials, both."""
 
 
 class UndoRedo(Struct, frozen=True):
-    """The last redo was a mistake: what it discarded counts again. Meant until the next stroke."""
+    """The last redo was a mistake: what it discarded counts again. Possible until the next stroke."""
 
 
 class Skip(_WithReason, frozen=True):
-    """The trial in hand is to be left out, and with the first of two that are compared also the second."""
+    """Leave out the trial in hand, and with the first of two compared trials also the second."""
 
 
 class Pause(Struct, frozen=True):
@@ -160,7 +160,7 @@ EVENT_NAMES: dict[type[Event], str] = {
     Finish: "finish",
 }
 
-# ---- what is to be done
+# ---- commands
 
 
 class AskBegin(Struct, frozen=True):
@@ -180,7 +180,7 @@ class AskMount(Struct, frozen=True):
 
 
 class _TakeCommand(Struct, frozen=True):
-    """Something is to be done about a take."""
+    """A command about a take."""
 
     trial: int
     take: int
@@ -226,9 +226,9 @@ class AskChoice(Struct, frozen=True):
 
 
 class AskRest(Struct, frozen=True):
-    """Let the subject rest; Resume goes on at any time."""
+    """Let the subject rest; Resume ends the rest at any time."""
 
-    duration: float | None  # [s], after which it goes on by itself; None: until the experimenter goes on
+    duration: float | None  # [s], after which the session continues; None: until the experimenter continues
 
 
 class KeepTake(_TakeCommand, frozen=True):
@@ -257,7 +257,7 @@ class AskFinish(Struct, frozen=True):
 
 
 class _Sentence(Struct, frozen=True):
-    """Something is said."""
+    """A message to people."""
 
     sentence: str
 
@@ -267,7 +267,7 @@ class Tell(_Sentence, frozen=True):
 
 
 class Refuse(_Sentence, frozen=True):
-    """The event is not meant now; nothing has changed."""
+    """The event does not fit the state; nothing has changed."""
 
 
 class EndSession(Struct, frozen=True):
@@ -294,7 +294,7 @@ ANSWER_EVENTS: dict[Answer, type[AnswerEvent] | None] = {
 
 
 def answer_problem(answer: AnswerEvent, expected: Answer) -> str | None:
-    """Say in a sentence what is wrong with an answer where `expected` is due; None where nothing is.
+    """Return a sentence on what is wrong with an answer where `expected` is due; None where nothing is.
 
     >>> answer_problem(Scored(120.0), "line")
     'a score lies between 0 and 100; 120 does not'

@@ -1,4 +1,4 @@
-"""From readings to strokes, their friction, and what is wrong with them."""
+"""From readings to strokes, their friction and their flaws."""
 
 from sessions.strokes.analysis import Analysis, analyse
 from sessions.strokes.settings import AnalysisSettings

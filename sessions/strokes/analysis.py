@@ -1,4 +1,4 @@
-"""The analysis of a whole recording: its strokes, the friction the model gets of them, and every flaw."""
+"""The analysis of a whole recording: its strokes, their friction for the model, and every flaw."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
@@ -22,7 +22,7 @@ Blocks = Iterable[tuple[Trial | None, ReadingBlock]]  # readings of trials, or o
 
 @dataclass(frozen=True, slots=True)
 class Analysis:
-    """What the readings of a recording say."""
+    """Results of the analysis of a recording."""
 
     simulated: bool
     strokes: tuple[Stroke, ...]  # in order of time
@@ -31,17 +31,17 @@ class Analysis:
     filtered: str  # what was done to the forces, for people
     settings: AnalysisSettings
     decisions: tuple[Decision, ...] = ()  # of people, in force
-    presses: tuple[Press, ...] = ()  # that measure how the face leans
+    presses: tuple[Press, ...] = ()  # that measure the tilt of the face
     intervals: tuple[StrokeIntervals, ...] = ()  # of each stroke's numbers
 
     @property
     def tilt(self) -> Tilt | None:
-        """Return how the face leans against the transducer; None where nothing pressed without sliding."""
+        """Return the tilt of the face against the transducer; None without a press."""
         return tilt_of(self.presses, self.settings)
 
     @property
     def bootstrap(self) -> BootstrapSettings:
-        """Return what the intervals are drawn from; enough presses measure how the face leans."""
+        """Return the settings of the intervals; the tilt is measured where there are enough presses."""
         settings, tilt = self.settings, self.tilt
         gain_error, cross_talk = settings.gain_uncertainty, settings.systematic.cross_talk
         prior = settings.systematic.tilt_prior
@@ -64,11 +64,11 @@ class Analysis:
 
     @property
     def flawed(self) -> bool:
-        """Say whether anything was lost or is doubtful; a lean that no press measures is only noted."""
+        """Say whether anything was lost or is doubtful; a tilt without enough presses is only noted."""
         return any(flaw.name is not FlawName.TILT_ASSUMED for flaw in self.flaws)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data, None where honesty allows no number; curves are left out."""
+        """Return the analysis as plain data, None for withheld numbers, without curves."""
         return {
             **({"simulated": "SIMULATED"} if self.simulated else {}),
             "strokes": [stroke.to_dict() for stroke in self.strokes],
@@ -86,10 +86,10 @@ class Analysis:
 def analyse(
     recording: Recording, settings: AnalysisSettings | None = None, decisions: Decisions | None = None
 ) -> Analysis:
-    """Return the strokes of a recording: within each trial's valid take, or anywhere where it has no trials.
+    """Return the strokes of a recording: within each trial's valid take, or anywhere if there are no trials.
 
-    Trials of practice and pre-evaluation are no part of the experiment: of them only presses are taken. `decisions` are
-    those kept in the session's folder, unless others are given. Raises RecordingError where their file cannot be read.
+    Trials of practice and pre-evaluation are not part of the experiment: only their presses are used. `decisions`
+    default to those in the session's folder. Raises RecordingError where their file cannot be read.
     """
     decisions = read(recording.folder) if decisions is None else decisions
     settings = settings or AnalysisSettings()
@@ -114,7 +114,7 @@ def analyse_blocks(blocks: Blocks, context: TrialContext) -> Analysis:
 
 
 def _without_intervals(blocks: Blocks, context: TrialContext) -> Analysis:
-    """Return an analysis whose intervals are not drawn yet: they depend on all presses of a session."""
+    """Return an analysis without intervals, which depend on all presses of a session."""
     plan, info, settings, decisions = context
     strokes: list[Stroke] = []
     friction: list[FrictionParameters] = []
@@ -155,7 +155,7 @@ def _with_intervals(analysis: Analysis) -> Analysis:
 
 
 def _assumed_tilt_flaw(analysis: Analysis) -> Iterable[Flaw]:
-    """Yield the note that too few presses measure the tilt, where friction depends on it."""
+    """Yield a note where friction depends on a tilt that too few presses measure."""
     count, fewest = len(analysis.presses), analysis.settings.press.press_fewest
     if count < fewest and any(stroke.mu_dynamic is not None for stroke in analysis.strokes):
         prior = analysis.settings.systematic.tilt_prior
@@ -182,7 +182,7 @@ def _decisions_without_stroke(decisions: Decisions, strokes: Iterable[Stroke]) -
 
 
 def with_present(analysis: Analysis, decision: Decision) -> Decision:
-    """Return a decision with what stands in its place now. Raises DecisionError where there is no such stroke."""
+    """Return a decision with the present value in `old`. Raises DecisionError where there is no such stroke."""
     if decision.undoes is not None:
         return decision
     if decision.what == "tilt":
@@ -201,11 +201,11 @@ def with_present(analysis: Analysis, decision: Decision) -> Decision:
 
 
 def preview(recording: Recording, decision: Decision, decisions: Decisions, present: Analysis) -> Analysis:
-    """Return the analysis as it would be with a decision more; `present` is that without it.
+    """Return the analysis with one more decision; `present` is the analysis without it.
 
-    Raises DecisionError where the decision cannot be, or would change nothing.
+    Raises DecisionError where the decision is not possible or has no effect.
     """
-    settings = replace(present.settings, tilt=(0.0, 0.0))  # the decisions set it
+    settings = replace(present.settings, tilt=(0.0, 0.0))  # the decisions set the tilt
     changed = analyse(recording, settings, decisions.with_line(decision))
     present_sentences = {flaw.sentence for flaw in present.flaws}
     for flaw in changed.flaws:
@@ -214,20 +214,20 @@ def preview(recording: Recording, decision: Decision, decisions: Decisions, pres
     return changed
 
 
-# What documents of older programs lack: before 2026-11-23 the first four were not drawn, before 2026-11-25 the others
-# were not stored. Once no such document is read, this goes.
+# Settings missing in documents of older programs: the first four not drawn before 2026-11-23, the others not stored
+# before 2026-11-25. Needed as long as such documents are read.
 _NEWER = (
     *("cross_talk", "tilt", "tilt_error", "tilt_origin", "tilt_presses"),
     *("top_alike", "most_alike", "least_free", "climb_ends", "detector", "climb"),
     *("onset_fewest", "onset_most", "onset_steep", "onset_reach"),
 )
 _DEFAULTS = {name: getattr(BootstrapSettings(), name) for name in _NEWER}
-_REPLACED = ("tilt_from_presses",)  # of documents from before 2026-11-25; `tilt_presses` says how many
+_REPLACED = ("tilt_from_presses",)  # in documents from before 2026-11-25; `tilt_presses` replaces it
 
 
 class _Intervals(msgspec.Struct):
     kind: str
-    settings: dict[str, Any]  # checked below, without what an older program did not draw
+    settings: dict[str, Any]  # checked below; older programs drew fewer
     strokes: tuple[StrokeIntervals, ...]
 
 
@@ -248,7 +248,7 @@ class _Analysis(msgspec.Struct):
 
 
 def check_analysis(document: Mapping[str, Any]) -> None:
-    """Raise ValueError where a document is no analysis that this program writes: where, and what is expected."""
+    """Raise ValueError, with place and expected value, where a document is not an analysis of this program."""
     analysis = complete(document, _Analysis)
     if len(analysis.bootstrap.strokes) != len(analysis.strokes):
         raise SettingsError("it has intervals of another number of strokes")
@@ -260,6 +260,6 @@ def check_analysis(document: Mapping[str, Any]) -> None:
 
 
 def bootstrap_settings(stored: Mapping[str, Any]) -> BootstrapSettings:
-    """Return the settings of stored intervals, the default for what was not drawn then. Raises SettingsError."""
+    """Return the settings of stored intervals, with defaults for those of newer programs. Raises SettingsError."""
     current = {name: value for name, value in stored.items() if name not in _REPLACED}
     return from_table(current, BootstrapSettings, "bootstrap")

@@ -1,8 +1,8 @@
 """Intervals of a stroke's numbers from sensor noise, zero, calibration and choice of window: a seeded block bootstrap.
 
-Readings within a tenth of a second are alike, so blocks of them are drawn again, not readings (Künsch 1989, Ann.
-Statist. 17:1217). Every repeat also draws how wrong calibration, tilt of the face and zero may be, and where the
-window may have begun and ended; the interval lies between two quantiles of what the repeats give.
+Readings within a tenth of a second are correlated, so blocks are resampled, not readings (Künsch 1989, Ann. Statist.
+17:1217). Each repeat also draws errors of calibration, tilt of the face and zero, and both ends of the window. The
+interval lies between two quantiles of the repeats.
 """
 
 from collections.abc import Iterable, Mapping
@@ -18,17 +18,17 @@ from sessions.strokes.sliding import slide_onset_draws
 from sessions.strokes.stick import break_away_draws
 from sessions.strokes.stroke import Interval, Stroke, StrokeCurve
 
-_OF_SESSION = 2**32 - 1  # in the seed, where a stroke has its number
+_OF_SESSION = 2**32 - 1  # in the seed, in place of a stroke's number
 
 
 class SystematicDraws:
-    """Errors of one session, (repeats,) of each; the same for each of its strokes."""
+    """Systematic errors of one session, (repeats,) each, shared by all its strokes."""
 
     def __init__(self, settings: BootstrapSettings) -> None:
-        """Draw gains, cross-talk and the lean of the face's normal towards +x and +y.
+        """Draw gains, cross-talk and the tilt of the face's normal towards +x and +y.
 
-        A press shows a sideways force by lean and by cross-talk: a lean from presses is their sum. The mean of so few
-        follows Student's law (JCGM 101:2008, 6.4.9).
+        A press shows a sideways force by tilt and by cross-talk: a tilt from presses is their sum. The mean of so few
+        presses follows Student's law (JCGM 101:2008, 6.4.9).
         """
         draw, repeats = np.random.default_rng([settings.seed, _OF_SESSION]), settings.repeats
         self.gain_t, self.gain_n, self.gain_torque = 1.0 + settings.gain_error * draw.standard_normal((3, repeats))
@@ -44,17 +44,17 @@ class SystematicDraws:
         self._drag_shares: Array = into_normal - lean
 
     def shares(self, direction: Array) -> tuple[Array, Array]:
-        """Return a and b (repeats,) [-] for a drag that points along a unit vector (2,)."""
+        """Return the shares of N in T, and of T in N, (repeats,) [-] each, for a drag along a unit vector (2,)."""
         return self._normal_shares @ direction, self._drag_shares @ direction
 
     def ratio(self, value: float | Array, direction: Array) -> Array:
-        """Return what T/N (repeats,) [-] truly was where it was measured as `value`."""
+        """Return the true T/N (repeats,) [-] for a measured T/N `value`."""
         normal_share, drag_share = self.shares(direction)
         return (value * self.gain_t + normal_share) / (self.gain_n + drag_share * value)
 
 
 def drag_direction(force: Array) -> Array:
-    """Return the unit vector (2,) of the sum of forces (n, 2) [N]; along +x where there is none."""
+    """Return the unit vector (2,) of the sum of forces (n, 2) [N]; along +x where the sum is zero."""
     x, y = float(np.nansum(force[:, 0])), float(np.nansum(force[:, 1]))
     length = float(np.hypot(x, y))
     return np.array([x, y]) / length if length > 0.0 else np.array([1.0, 0.0])
@@ -75,7 +75,7 @@ class StrokeIntervals:
     tangential_force: Interval | None  # mean over the steady window [N]
     peak_normal: Interval | None  # [N]
     peak_tangential: Interval | None  # [N]
-    heading: Interval | None  # about the reported angle: an end may lie beyond 180 [degrees]
+    heading: Interval | None  # around the reported angle: an end may exceed 180 [degrees]
     direction_agrees: float | None  # share of repeats in which the direction is the reported one [-]
     onset: Interval | None  # [s, device time]
     break_away: Interval | None  # [s, device time]
@@ -99,36 +99,36 @@ def stroke_intervals(stroke: Stroke, number: int, settings: BootstrapSettings | 
         if name not in repeats or value is None:
             return None
         low, high = np.quantile(repeats[name], tails).tolist()
-        # An instant found at the end of the stretch in which it may lie, as by the first reading after it, is one too.
-        # A lean that is known and was not levelled moves the truth off the reported number: it lies within as well.
+        # An instant at the end of the stretch in which it may lie, such as the first reading after it, belongs to it. A
+        # known tilt that was not levelled moves the truth off the reported number, which is included as well.
         contains_value = name in ("onset", "slide_onset") or settings.tilt != (0.0, 0.0)
         return (min(low, value), max(high, value)) if contains_value else (low, high)
 
     agrees = None
-    if stroke.direction is not None and "heading" in repeats:  # where it lies within 60 degrees of that reported
+    if stroke.direction is not None and "heading" in repeats:  # within 60 degrees of the reported one
         agrees = float(np.mean(stroke.direction * np.cos(np.radians(repeats["heading"])) >= 0.5))
     return StrokeIntervals(number, stroke.trial, **{name: interval(name) for name in NUMBERS}, direction_agrees=agrees)
 
 
 def intervals_document(settings: BootstrapSettings, intervals: Iterable[StrokeIntervals]) -> dict[str, Any]:
-    """Return intervals as plain data, with what they are and the settings they were drawn with."""
+    """Return intervals as plain data, with their meaning and the settings of their draws."""
     rows = [asdict(interval) for interval in intervals]
     return {"kind": settings.kind, "kinds": dict(settings.kinds), "settings": asdict(settings), "strokes": rows}
 
 
 def _repeats(stroke: Stroke, number: int, settings: BootstrapSettings) -> Mapping[str, Array]:
-    """Return the numbers (repeats,) of the stroke at position `number`, by name; none of a curve that is too short."""
+    """Return the numbers (repeats,) of the stroke at position `number`, by name; none for a curve that is too short."""
     if stroke.curve is None or len(stroke.curve.time) < 3:
         return {}
     return _Repeats(stroke, stroke.curve, settings, np.random.default_rng([settings.seed, number])).numbers()
 
 
 class FrictionDraws(NamedTuple):
-    """What the friction of a stroke may have been: (repeats,) of each, together as they were drawn."""
+    """Joint draws of a stroke's friction, (repeats,) each."""
 
     mu: Array  # [-]
     tau_max: Array  # [MPa]
-    normal_force: Array | None  # mean over the steady window [N]; None where there is none
+    normal_force: Array | None  # mean over the steady window [N]; None without one
 
 
 def friction_draws(
@@ -136,7 +136,7 @@ def friction_draws(
 ) -> FrictionDraws | None:
     """Return mu, tau_max and normal force of each repeat; None without mu or tau_max.
 
-    They are the draws that `stroke_intervals` takes its quantiles from; an error of calibration moves both alike.
+    `stroke_intervals` takes quantiles of the same draws; a calibration error moves mu and tau_max together.
     """
     repeats = _repeats(stroke, number, settings or BootstrapSettings())
     name = "mu_max" if rule == "maximum" else "mu_dynamic"
@@ -146,11 +146,11 @@ def friction_draws(
 
 
 def mean_inflation(blocks: Array, settings: BootstrapSettings) -> tuple[float, float]:
-    """Return how much further than that of independent blocks (k,) their mean strays, and its degrees of freedom.
+    """Return the inflation of the standard error of a mean of correlated blocks (k,) and its degrees of freedom.
 
-    Neighbours that are alike count for fewer: of a first-order autoregression n (1 - r) / (1 + r) are independent
-    (Bayley and Hammersley 1946, Suppl. J. R. Stat. Soc. 8:184). Found in n blocks about their own mean, r comes out too
-    small by (1 + 4 r) / n (Marriott and Pope 1954, Biometrika 41:390; Kendall 1954, 41:403), which is put right here.
+    Correlated neighbours count for fewer: in a first-order autoregression n (1 - r) / (1 + r) are independent (Bayley
+    and Hammersley 1946, Suppl. J. R. Stat. Soc. 8:184). Estimated from n blocks about their own mean, r is too small by
+    (1 + 4 r) / n (Marriott and Pope 1954, Biometrika 41:390; Kendall 1954, 41:403), corrected here.
     """
     n = len(blocks)
     deviations = blocks - blocks.mean()
@@ -164,7 +164,7 @@ def mean_inflation(blocks: Array, settings: BootstrapSettings) -> tuple[float, f
 
 
 class _Repeats:
-    """What all numbers of one stroke share in each of its repeats."""
+    """The draws shared by all numbers of one stroke in each repeat."""
 
     def __init__(
         self, stroke: Stroke, curve: StrokeCurve, settings: BootstrapSettings, draw: np.random.Generator
@@ -175,7 +175,7 @@ class _Repeats:
         self._systematic = SystematicDraws(settings)
         self._gain_t, self._gain_n = self._systematic.gain_t, self._systematic.gain_n
         self._noise_t, self._noise_n = curve.noise
-        # The zero's drift was seen as one length of three axes; within it the zero may lie anywhere.
+        # The drift is one length over three axes; the zero is uniformly distributed within it.
         drift = (stroke.zero_drift or 0.0) / np.sqrt(3.0 * 12.0)
         independent = np.sqrt(max(1.0, curve.quiet / settings.block))
         self._zero_t_sd = float(np.hypot(drift, self._noise_t / independent))
@@ -213,9 +213,9 @@ class _Repeats:
         return numbers | {name: draws for name, draws in instants.items() if draws is not None}
 
     def _peak_error(self, force: Array, noise: float, *, filtered: bool = True) -> Array:
-        """Return how far the true greatest force may lie from the reported one (repeats,) [N].
+        """Return draws of the true greatest force less the reported one (repeats,) [N].
 
-        Noise has raised the reported one about as far as noise drawn once more raises that on average.
+        Noise raised the reported peak about as much as fresh noise raises the reported peak on average.
         """
         candidates = force[force >= self._settings.top_share * np.nanmax(force)]
         correlation_time = self._settings.top_alike * self._settings.block if filtered else 0.0
@@ -225,7 +225,7 @@ class _Repeats:
         return peaks - 2.0 * peaks.mean() + candidates.max()
 
     def _single_ratio(self, value: float) -> Array:
-        """Return a ratio that one short stretch gives (repeats,); the stretch is where T/N is nearest to it."""
+        """Return draws (repeats,) of a ratio from one short stretch, taken where T/N is nearest to it."""
         ratio = self._curve.ratio
         nearest = int(np.nanargmin(np.abs(ratio - value)))
         normal = float(self._curve.normal[nearest])
@@ -236,7 +236,7 @@ class _Repeats:
         return self._systematic.ratio(value, direction) + from_zero + scatter
 
     def _window(self) -> dict[str, Array]:
-        """Return dynamic friction and speed (repeats,) from blocks of the steady window drawn again."""
+        """Return dynamic friction and speed (repeats,) from resampled blocks of the steady window."""
         steady, settings = self._stroke.steady, self._settings
         if steady is None or self._stroke.mu_dynamic is None:
             return {}
@@ -253,7 +253,7 @@ class _Repeats:
         sample = blocks[positions]  # (repeats, blocks, 9)
         total = weight.sum(axis=1)
         means = np.einsum("rbc,rb->rc", sample, weight) / total[:, None]
-        # A mean of few blocks, or of blocks that are alike, strays further than drawing them shows.
+        # A mean of few or correlated blocks varies more than resampling shows.
         inflation, dof = mean_inflation(blocks[:, 0], settings)
         inflation *= np.sqrt(total / np.maximum(total - 1.0, 1.0) * dof / self._draw.chisquare(dof, len(total)))
         lightness = float(blocks[:, 1].mean())
@@ -263,8 +263,8 @@ class _Repeats:
         from_zero = (self._zero_t - self._stroke.mu_dynamic * self._zero_n) * lightness
         numbers = {"mu_dynamic": self._systematic.ratio(mu, direction) + from_zero}
         if self._stroke.normal_force is not None and self._stroke.tangential_force is not None:
-            # A force may change along the stroke: its mean is that of a window, not of blocks drawn again. Windows are
-            # drawn inwards, where N may be greater, but might have been wider too: about their own mean.
+            # A force may vary along the stroke: its mean varies with the window, not with resampled blocks. Windows are
+            # drawn inwards, where N may be greater, but might have been wider: they are centred on their mean.
             force_means = inside_window @ blocks[:, 5:7] / total[:, None]
             force_means -= force_means.mean(axis=0)
             normal, tangential = self._stroke.normal_force, self._stroke.tangential_force
@@ -279,11 +279,11 @@ class _Repeats:
         if (heading := self._stroke.heading) is not None:
             gain_ratio = 1.0 + settings.gain_error * np.sqrt(2.0) * self._draw.standard_normal(len(velocity))
             angle = np.degrees(np.arctan2(velocity[:, 1] * gain_ratio, velocity[:, 0]))
-            numbers["heading"] = heading + (angle - heading + 180.0) % 360.0 - 180.0  # by whole turns nearest to it
+            numbers["heading"] = heading + (angle - heading + 180.0) % 360.0 - 180.0  # within half a turn of it
         return numbers
 
     def _break_away(self) -> Array | None:
-        """Return the break-away (repeats,), where the analysis found one and no person decided it."""
+        """Return the break-away (repeats,), where the analysis found it and no person decided it."""
         stroke, curve = self._stroke, self._curve
         if stroke.steady is None or stroke.break_away is None or "stick" in stroke.decided:
             return None
@@ -294,7 +294,7 @@ class _Repeats:
         return break_away_draws(columns, shortest, zero, self._settings, self._draw, peaked=peaked)
 
     def _slide_onset(self, speed: Array | None) -> Array | None:
-        """Return the slide's onset (repeats,), where the analysis found one and no person decided it."""
+        """Return the slide's onset (repeats,), where the analysis found it and no person decided it."""
         stroke, curve = self._stroke, self._curve
         if stroke.steady is None or stroke.slide_onset is None or speed is None or "slide_onset" in stroke.decided:
             return None
@@ -305,7 +305,7 @@ class _Repeats:
         return slide_onset_draws(curve.time[stretch], curve.speed[stretch], threshold, noise, self._draw)
 
     def _onset(self) -> Array | None:
-        """Return the onset (repeats,), where the contact began there and no person decided it."""
+        """Return the onset (repeats,), where the readings show it and no person decided it."""
         onset, curve = self._stroke.onset, self._curve
         if onset is None or "onset" in self._stroke.decided:
             return None
@@ -314,13 +314,13 @@ class _Repeats:
         if len(quiet) < self._settings.fewest_quiet:
             return None
         noise = float(quiet.std())
-        # How large the noise is, and with it the threshold, is estimated from these readings too.
+        # The noise, and with it the threshold, is estimated from these readings, with an error.
         band = self._settings.detector.leave_noise * noise / np.sqrt(2.0 * len(quiet))
         zero_error = self._zero_n + band * self._draw.standard_normal(self._settings.repeats)
         return onset_draws((curve.time, curve.unfiltered), onset, noise, zero_error, self._settings, self._draw)
 
     def _sample(self, count: int) -> tuple[Indices, Array, Array]:
-        """Return blocks drawn for each repeat (repeats, count); 1 for those that fit into its window; 1 for its own."""
+        """Return each repeat's drawn blocks, 1 for those to use, 1 for blocks in its window, (repeats, count) each."""
         repeats = self._settings.repeats
         trim = self._settings.inwards * count * self._draw.uniform(size=(2, repeats))
         starts, stops = np.floor(trim[0]), count - np.floor(trim[1])

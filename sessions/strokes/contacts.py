@@ -1,6 +1,6 @@
 """Contacts from the normal force, by one detector for live and recorded readings, and the strokes in them.
 
-Strokes are cut at valleys of the force and where the finger turns.
+Strokes are cut at valleys of the force and where the finger reverses.
 """
 
 from collections import deque
@@ -16,7 +16,7 @@ from drivers.arrays import Array
 from sessions.strokes.forces import peaks
 from sessions.strokes.settings import AnalysisSettings, BootstrapSettings, DetectorSettings
 
-NORMAL_STEP = 1.4826 / sqrt(2)  # standard deviation of white noise over the median absolute step between neighbours
+NORMAL_STEP = 1.4826 / sqrt(2)  # standard deviation of white noise over its median absolute step between neighbours
 
 
 class Baseline(NamedTuple):
@@ -43,17 +43,17 @@ class Lift(ContactEvent):
 
 
 class ContactDetector:
-    """Tell contact onset and lift from normal force and time, however the readings were cut into blocks.
+    """Detect contact onset and lift from normal force and time, independently of how readings are split into blocks.
 
-    Zero and noise are measured in the unloaded stretch before contact and follow a slow drift until the finger
-    touches; without such a stretch nothing is detected. A force well below its zero shows that this must be renewed.
+    Zero and noise are measured in the unloaded stretch before contact and follow a slow drift until the finger touches;
+    without such a stretch nothing is detected. A force well below its zero renews this measurement.
     """
 
     def __init__(self, settings: DetectorSettings | None = None, baseline: Baseline | None = None) -> None:
-        """Start with nothing known, or with a baseline measured elsewhere, which then stays as given."""
+        """Start without a baseline, or with one measured elsewhere, which then stays fixed."""
         self._settings = settings or DetectorSettings()
         self._follows = baseline is None
-        # Finished ones; the newest may hold a touch's first part.
+        # Finished bins; the newest may hold the first part of a touch.
         self._bins: deque[list[float]] = deque(maxlen=self._settings.baseline_parts + 1)
         self._bin: list[float] = []
         self._bin_start: float | None = None
@@ -62,13 +62,13 @@ class ContactDetector:
         self._above: float | None = None  # first reading of the present run above the onset threshold
         self._below: float | None = None  # first reading of the present run below the lift threshold
         self._pull_start: float | None = None  # first reading of the present run far below zero
-        self._has_zero = False  # zero and noise are known
+        self._has_zero = False  # zero and noise were measured
         self._level = self._noise_band = self._threshold = self._lift = 0.0
         if baseline is not None:
             self._take(baseline)
 
     def feed(self, time: Array, normal_force: Array) -> tuple[ContactEvent, ...]:
-        """Take readings, time (n,) [s] and normal force (n,) [N, pressing > 0, not zeroed]; return the events."""
+        """Process readings, time (n,) [s] and normal force (n,) [N, pressing > 0, not zeroed]; return the events."""
         events = map(self._take_reading, time.tolist(), normal_force.tolist())
         return tuple(event for event in events if event is not None)
 
@@ -118,7 +118,7 @@ class ContactDetector:
         self._bin, self._bin_start = [], None
 
     def _gather(self, t: float, force: float) -> None:
-        """Keep the readings of the last stretch in bins, and take zero and noise from them when they are quiet."""
+        """Collect the latest readings in bins, and take zero and noise from them when they are quiet."""
         if self._bin_start is None:
             self._bin_start = t
         if t - self._bin_start >= self._settings.baseline / self._settings.baseline_parts - _ROUNDING:
@@ -142,7 +142,7 @@ _ROUNDING = 1e-9  # times are sums of ticks [s]
 
 
 def _since(start: float | None, t: float, *, holds: bool) -> float | None:
-    """Return since when something has been so without a break, None where it is not so at `t` [s]."""
+    """Return the start of the present run in which a condition holds, None where it fails at `t` [s]."""
     return None if not holds else t if start is None else start
 
 
@@ -156,9 +156,9 @@ def onset_threshold(noise: float, settings: DetectorSettings) -> float:
 
 
 def is_quiet(stretch: list[float], settings: DetectorSettings) -> bool:
-    """Say whether a stretch of forces [N] spreads no more than noise does.
+    """Say whether a stretch of forces [N] spreads no more than noise.
 
-    Noise is estimated from the median step between neighbours, which a slow movement barely changes.
+    Noise is estimated from the median step between neighbours, which slow movement barely changes.
     """
     if len(stretch) < settings.baseline_readings:
         return False
@@ -180,11 +180,11 @@ def onset_draws(
     settings: BootstrapSettings,
     draw: np.random.Generator,
 ) -> Array | None:
-    """Return where the force may have left its noise (repeats,) [s]; None where it had left it before the onset.
+    """Return draws of the onset (repeats,) [s]; None where the force exceeds its noise before the onset.
 
-    The detector's rule is repeated: a force that climbs as steeply leaves its noise (`leave_noise`) between two
-    readings, and noise drawn anew moves the reading that detects it. `columns` are time [s] and unfiltered N [N] (n,)
-    from before the contact on, `noise` that of N and `zero` how wrong its zero may be (repeats,) [N].
+    The detector's rule is repeated: a force that rises as steeply leaves its noise (`leave_noise`) between two
+    readings, and fresh noise moves the reading that detects it. `columns` are time [s] and unfiltered N [N] (n,) from
+    before the contact on, `noise` is the noise of N and `zero` the error of its zero (repeats,) [N].
     """
     time, force = columns
     fewest, detector = settings.onset_fewest, settings.detector
@@ -194,7 +194,7 @@ def onset_draws(
     rise = force[index:] < 2.0 * max(detector.leave_noise * noise, float(force[index]))
     rise_slice = slice(index - 1, index + max(fewest, int(np.argmin(rise)) + 1))
     step = float(np.median(np.diff(time[rise_slice])))
-    # Skin stiffens as it is pressed: a force that bends upwards was less steep where it left the noise.
+    # Skin stiffens under pressure: a force that curves upwards was less steep where it left the noise.
     bend, slope, _ = np.polyfit(time[rise_slice] - (onset - step / 2.0), force[rise_slice], 2).tolist()
     chord = float(np.polyfit(time[rise_slice], force[rise_slice], 1)[0])
     slope = max(slope if bend > 0.0 else chord, settings.onset_steep * chord)
@@ -202,7 +202,7 @@ def onset_draws(
         return None
     reach = min(settings.onset_reach * noise / slope, settings.onset_most * step / 2.0)
     offsets = np.arange(-reach, reach + step, step)
-    # Readings of each repeat, counted from the crossing: the first lies anywhere within a step.
+    # Readings of each repeat, relative to the crossing: the first is uniform within a step.
     times = offsets + step * draw.uniform(size=(len(zero), 1))  # (repeats, k)
     in_noise = slope * times + noise * draw.standard_normal(times.shape) <= 0.0
     last_in_noise = np.where(in_noise.any(axis=1), times.shape[1] - 1 - np.argmax(in_noise[:, ::-1], axis=1), -1)
@@ -212,19 +212,19 @@ def onset_draws(
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """Readings during which something touches."""
+    """Readings of one contact."""
 
     start: int  # position of the first reading
     stop: int  # position past the last
     onset: float | None  # [s, device time]; None where the recording begins in contact
     lift: float | None  # [s, device time]; None where it ends in contact
-    valleys: tuple[int, ...] = ()  # readings of least force between it and neighbours without a lift
-    reversals: tuple[int, ...] = ()  # readings at which the finger turned, where that is its beginning or end
-    uncut: "Contact | None" = None  # that turns cut it out of
+    valleys: tuple[int, ...] = ()  # readings of least force at its borders with neighbours, without a lift
+    reversals: tuple[int, ...] = ()  # readings at which the finger reversed, at its beginning or end
+    uncut: "Contact | None" = None  # the contact before reversals cut it
 
 
 def find_contacts(time: Array, normal: Array, baseline: Baseline, settings: AnalysisSettings) -> tuple[Contact, ...]:
-    """Return the contacts in readings, time (n,) [s] and normal force (n,) [N, not zeroed], for a known zero."""
+    """Return the contacts in readings, time (n,) [s] and normal force (n,) [N, not zeroed], for a given zero."""
     if not len(time):
         return ()
     events = ContactDetector(settings.detector, baseline).feed(time, normal)
@@ -239,10 +239,10 @@ def find_contacts(time: Array, normal: Array, baseline: Baseline, settings: Anal
 
 
 def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: AnalysisSettings) -> tuple[Contact, ...]:
-    """Return the strokes of a contact: two are separated where the zeroed N between them falls far below both peaks.
+    """Return the strokes of a contact: N between two falls far below both peaks.
 
-    `normal` (n,) [N] is zeroed and filtered, of all readings. nan is
-    no force next to a gap that may hide a lift, and no valley elsewhere, as in stretches too short for the filter.
+    `normal` (n,) [N] of all readings is zeroed and filtered. nan counts as no force next to a gap that may hide a lift,
+    and is bridged elsewhere, as in stretches too short for the filter.
     """
     inside = slice(contact.start, contact.stop)
     force = np.maximum(_bridge_gaps(time[inside], normal[inside], settings.contact.longest_gap), 0.0)
@@ -250,7 +250,7 @@ def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: Ana
     positions, prominences = peaks(with_ends)
     crests = positions[prominences >= (1.0 - settings.contact.valley) * with_ends[positions]] - 1
     crests = crests[force[crests] >= settings.contact.light_share * force.max(initial=0.0)]
-    # Peaks of exactly the same height stand out of everything but one another.
+    # Between peaks of exactly equal height the prominence shows no valley.
     valleys = [
         contact.start + lowest
         for first, second in pairwise(crests)
@@ -264,7 +264,7 @@ def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: Ana
 
 
 def _bridge_gaps(time: Array, force: Array, longest: float) -> Array:
-    """Return forces (n,) [N] with straight lines in place of nan; 0 where a line would cross a gap of `longest` [s]."""
+    """Return forces (n,) [N] with nan interpolated linearly; 0 where that would cross a gap over `longest` [s]."""
     finite = np.flatnonzero(np.isfinite(force))
     if not len(finite):
         return np.zeros_like(force)
@@ -276,7 +276,7 @@ def _bridge_gaps(time: Array, force: Array, longest: float) -> Array:
 
 
 def _piece(contact: Contact, start: int, stop: int, time: Array, normal: Array, settings: AnalysisSettings) -> Contact:
-    """Return the stroke between two borders; where a border is a valley it is cut back to a share of its peak."""
+    """Return the stroke between two borders, cut back at a valley to a share of its peak."""
     valleys = tuple(border for border in (start, stop) if border not in (contact.start, contact.stop))
     force = np.nan_to_num(normal[start:stop])
     pressed = np.flatnonzero(force >= settings.contact.valley * force.max())
@@ -291,7 +291,7 @@ def _piece(contact: Contact, start: int, stop: int, time: Array, normal: Array, 
 
 
 class _DragRun(NamedTuple):
-    """Consecutive readings in which the drag keeps its side, or turns slowly."""
+    """Consecutive readings in which the drag keeps its direction, or turns slowly."""
 
     first: int
     last: int
@@ -300,20 +300,20 @@ class _DragRun(NamedTuple):
 
     @property
     def drag(self) -> float:
-        """Its mean [N]."""
+        """Mean drag [N]."""
         return float(np.hypot(*self.push)) / self.blocks
 
 
 def split_at_reversals(
     contact: Contact, time: Array, wrench: Array, unsure: float, settings: AnalysisSettings
 ) -> tuple[Contact, ...]:
-    """Return the strokes of a contact, cut where the drag turns to the other side and stays there.
+    """Return the strokes of a contact, cut where the drag reverses and stays reversed.
 
     `wrench` (n, 6) [N, N mm] of all readings at `time` (n,) [s] is zeroed, in the face frame and filtered; its zero may
-    be `unsure` [N] sideways. The drag has turned where it points more than a right angle off the way it had just before
-    (hysteresis: with T/N beyond a share of its median, T beyond twice what the zero leaves open, for about as long as
-    the shortest stroke and a share of the longest run, and no light touch). A drag that turns slowly, as in circles, is
-    not cut.
+    be `unsure` [N] sideways. The drag has reversed where it points more than a right angle off its direction just
+    before. Hysteresis: T/N exceeds a share of its median, T exceeds twice the zero's uncertainty, for about the
+    shortest stroke and a share of the longest run, and without light touches. A drag that turns slowly, as in circles,
+    is not cut.
     """
     stretch = wrench[contact.start : contact.stop]
     runs = _drag_runs(stretch, time[contact.start : contact.stop], unsure, settings)
@@ -335,7 +335,7 @@ def split_at_reversals(
 
 
 def _drag_runs(wrench: Array, time: Array, unsure: float, settings: AnalysisSettings) -> list[_DragRun]:
-    """Return the runs of the drag in a wrench (n, 6) without those that are too short or too weak."""
+    """Return the runs of the drag in a wrench (n, 6), without short and weak ones."""
     rule, normal = settings.contact, -wrench[:, 2]
     floor = max(settings.ratio.force_floor, settings.ratio.force_floor_share * float(np.nanmax(normal, initial=0.0)))
     pressed = np.flatnonzero(normal >= floor)
@@ -346,7 +346,7 @@ def _drag_runs(wrench: Array, time: Array, unsure: float, settings: AnalysisSett
     counts = np.diff(np.append(firsts, len(pressed)))
     force, load = (np.add.reduceat(column[pressed], firsts, axis=0).T / counts for column in (wrench[:, :2], normal))
     drag = np.hypot(*force)
-    if unsure > settings.zero.drift_refused * float(np.median(drag)):  # the drag gives no number
+    if unsure > settings.zero.drift_refused * float(np.median(drag)):  # the drag is too uncertain
         return []
     least_drag = rule.turn_share * float(np.median(drag / load)) * load
     strong = np.flatnonzero((drag >= least_drag) & (drag > rule.turn_unsure * unsure))
@@ -375,7 +375,7 @@ def _drag_runs(wrench: Array, time: Array, unsure: float, settings: AnalysisSett
 
 
 def _reversal(wrench: Array, run: _DragRun, following: _DragRun) -> int:
-    """Return the reading of a wrench (n, 6) from which on the drag points the `following` way."""
+    """Return the first reading of a wrench (n, 6) from which the drag points as in the `following` run."""
     change = following.push / np.hypot(*following.push) - run.push / np.hypot(*run.push)
     before_next = wrench[run.first : following.first + 1, :2] @ change
     return run.first + int(np.flatnonzero(before_next < 0.0)[-1]) + 1

@@ -1,7 +1,7 @@
-"""What people decided about a session's strokes: a file in the session's folder that only grows.
+"""Decisions of people about a session's strokes, in an append-only file in the session's folder.
 
-Readings stay as they are. A decision sets one thing of one stroke (or of a trial, or of the session), says who decided
-it, when and why, and what stood there before; undoing it is a line of its own. What is in force follows from all lines.
+Readings never change. A decision sets one value of a stroke, a trial or the session, and states who decided it, when,
+why, and the value before; undoing it is a line of its own. The decisions in force follow from all lines.
 """
 
 import os
@@ -20,7 +20,7 @@ from sessions.recording.derived import bytes_of
 from sessions.recording.head import compact_json
 from sessions.recording.schema import RecordingError, text_crc
 
-MOST_TILT = 20.0  # more is a face mounted wrongly, not one that leans [degrees]
+MOST_TILT = 20.0  # a larger tilt is a wrongly mounted face [degrees]
 DECISIONS = "decisions.jsonl"  # in a session's folder
 
 Span = tuple[float, float]
@@ -33,14 +33,14 @@ _Stretch = tuple[_Instant, _Instant]
 
 
 class Kind(NamedTuple):
-    """What the value of a decision is."""
+    """The kind of value that a decision sets."""
 
-    form: Any  # the type that msgspec holds it against
+    form: Any  # the type that msgspec checks
     sentence: str  # the same, for people
     unit: str = ""
 
 
-# What can be decided. Times are on the device's clock.
+# Values that can be decided. Times are on the device's clock.
 OF_STROKE: Mapping[str, Kind] = {
     "onset": Kind(_Instant, "an instant [s]", "s"),
     "lift": Kind(_Instant, "an instant [s]", "s"),
@@ -68,7 +68,7 @@ OF_SESSION: Mapping[str, Kind] = {
 
 
 class DecisionError(ValueError):
-    """A decision that cannot be: which, and what is allowed."""
+    """A decision that is not possible; the message says what is allowed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +80,7 @@ class Decision:
     what: str = ""  # a name of OF_STROKE, OF_TRIAL or OF_SESSION; "" where a line is undone
     trial: int | None = None  # None: of a recording without trials, or of the session
     stroke: int | None = None  # its number within the trial, from 1; None: of the trial, or of the session
-    old: Value = None  # what stood there before
+    old: Value = None  # value before
     new: Value = None
     undoes: int | None = None  # number of a line
     number: int = 0  # from 1; 0 until it is recorded
@@ -88,12 +88,12 @@ class Decision:
 
     @property
     def target(self) -> tuple[int | None, int | None, str]:
-        """What it sets: of two in force for one place the later one acts."""
+        """The value that it sets; the latest decision about one value acts."""
         return self.trial, self.stroke, self.what
 
     @property
     def target_text(self) -> str:
-        """Where it belongs, for people.
+        """The stroke or trial, for people.
 
         >>> Decision("E02", "", "kept", trial=3, stroke=1).target_text
         'stroke 1 of trial 3'
@@ -119,11 +119,11 @@ class Decision:
 
     @property
     def leaves_out(self) -> bool:
-        """Whether it keeps a stroke out of the results."""
+        """Whether it leaves a stroke out of the results."""
         return self.what == "kept" and not self.new and self.undoes is None
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data, as its line holds it."""
+        """Return the decision as plain data, as in its line."""
         document = asdict(self)
         record = {name: document.pop(name) for name in ("number", "made_utc", "by", "why")}
         undoes = document.pop("undoes")
@@ -141,12 +141,12 @@ def _value_text(value: Value, unit: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class StrokeDecisions:
-    """What is in force of one stroke."""
+    """Decisions in force about one stroke."""
 
-    by_name: Mapping[str, Decision]  # by what
+    by_name: Mapping[str, Decision]  # by name of the value
 
-    def value(self, name: str) -> Any:  # noqa: ANN401 - of the kind that `OF_STROKE` names
-        """Return what was decided, None where nothing was."""
+    def value(self, name: str) -> Any:  # noqa: ANN401 - of the kind in `OF_STROKE` names
+        """Return the decided value, None without a decision."""
         return self.by_name[name].new if name in self.by_name else None
 
     def instant(self, name: str) -> float | None:
@@ -156,14 +156,14 @@ class StrokeDecisions:
 
 @dataclass(frozen=True, slots=True)
 class Decisions:
-    """Every line of a session's file, in order, and what is wrong with the file."""
+    """All lines of a session's file, in order, and problems of the file."""
 
     lines: tuple[Decision, ...] = ()
     problems: tuple[str, ...] = ()
 
     @property
     def in_force(self) -> tuple[Decision, ...]:
-        """Return the decisions that act, by number: not undone (undoing can be undone too), nor set anew since."""
+        """Return the decisions in force, by number: neither undone (undoing can be undone too) nor replaced since."""
         latest = {decision.target: decision for decision in self.standing if decision.undoes is None}
         return tuple(sorted(latest.values(), key=lambda decision: decision.number))
 
@@ -180,31 +180,31 @@ class Decisions:
         return tuple(reversed(standing))
 
     def of_stroke(self, trial: int | None, stroke: int) -> StrokeDecisions:
-        """Return what is in force of a stroke, its number counted within the trial from 1."""
+        """Return the decisions in force about a stroke, numbered within the trial from 1."""
         about = (decision for decision in self.in_force if (decision.trial, decision.stroke) == (trial, stroke))
         return StrokeDecisions({decision.what: decision for decision in about})
 
     def choice(self, trial: int | None) -> Decision | None:
-        """Return the decision on the stroke of a trial that the model gets, None where there is none."""
+        """Return the decision which stroke of a trial the model uses, None without one."""
         choices = (decision for decision in self.in_force if decision.what == "choice")
         return next((decision for decision in choices if decision.trial == trial), None)
 
     @property
     def tilt(self) -> Span | None:
-        """Return how far the face leans to +x and to +y [degrees], where that was decided."""
+        """Return the decided tilt of the face towards +x and +y [degrees], None without one."""
         return next((cast("Span", decision.new) for decision in self.in_force if decision.what == "tilt"), None)
 
     def with_line(self, decision: Decision) -> "Decisions":
-        """Return them with one more, not recorded, to see what it would do. Raises DecisionError where it cannot be."""
+        """Return the decisions with one more, not recorded, for a preview. Raises DecisionError."""
         _check(decision, self)
         last = max((line.number for line in self.lines), default=0)
         return replace(self, lines=(*self.lines, replace(decision, number=last + 1)))
 
 
 def read(folder: Path) -> Decisions:
-    """Return the decisions kept in a session's folder, none where there is no file.
+    """Return the decisions stored in a session's folder, none without a file.
 
-    A line that is torn or damaged is left out and named. Raises RecordingError where the file cannot be read.
+    A torn or damaged line is left out and reported. Raises RecordingError where the file cannot be read.
     """
     return parse(bytes_of(folder / DECISIONS))
 
@@ -231,9 +231,9 @@ def parse(content: bytes) -> Decisions:
 
 
 def append(recording: Recording, decision: Decision) -> Decision:
-    """Record a decision, or that one is undone; return it with its number and date, safe on the disk.
+    """Record a decision or an undoing; return it with number and date once it is safe on the disk.
 
-    Raises DecisionError where it cannot be, RecordingError where it cannot be written.
+    Raises DecisionError for one that is not possible, RecordingError where writing fails.
     """
     path = recording.folder / DECISIONS
     with name_failure(RecordingError, f"{path} cannot be written"), one_at_a_time(recording.folder):
@@ -241,9 +241,9 @@ def append(recording: Recording, decision: Decision) -> Decision:
         torn = bool(content) and not content.endswith(b"\n")
         number = max(parse(content).with_line(decision).lines[-1].number, content.count(b"\n") + torn + 1)
         entry = replace(decision, number=number, made_utc=datetime.now(UTC).isoformat(timespec="seconds"))
-        # A line is compact JSON whose last name, crc32, is that of the JSON text without it.
+        # A line is compact JSON; its last entry, crc32, is the sum of the JSON text without that entry.
         text = compact_json({**recording.mark, **entry.to_dict()})
-        newline = "\n" if torn else ""  # a torn line stays, as a line of its own
+        newline = "\n" if torn else ""  # a torn line stays as a separate line
         with path.open("ab") as file:
             file.write(f'{newline}{text[:-1]},"crc32":{text_crc(text)}}}\n'.encode())
             file.flush()
@@ -252,7 +252,7 @@ def append(recording: Recording, decision: Decision) -> Decision:
 
 
 def _decision(line: bytes) -> Decision | str | None:
-    """Return the decision in a line, or what is wrong with it; None for an empty one."""
+    """Return the decision in a line, or a sentence on its fault; None for an empty line."""
     if not line.strip():
         return None
     try:
@@ -268,7 +268,7 @@ def _decision(line: bytes) -> Decision | str | None:
 
 
 def _check(decision: Decision, decisions: Decisions) -> None:
-    """Raise DecisionError unless a decision can be recorded after those before it."""
+    """Raise DecisionError unless a decision is possible after the earlier ones."""
     if not decision.by.strip() or not decision.why.strip():
         raise DecisionError("a decision says who decides and why: give both")
     if decision.undoes is not None:
@@ -285,7 +285,7 @@ def _check(decision: Decision, decisions: Decisions) -> None:
 
 
 def _fits(value: Value, form: object) -> bool:
-    """Say whether a value is of the kind that is decided; two instants must come one after the other."""
+    """Say whether a value has the right type; of two instants the first must be earlier."""
     try:
         msgspec.convert(value, form)
     except msgspec.ValidationError:

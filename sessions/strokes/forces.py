@@ -1,7 +1,7 @@
 """Forces at the stimulus's face: the wrench in the face frame, its zero-phase filter, ratio and centre of pressure.
 
 The filter is SciPy's compiled loop, loaded without the rest of `scipy.signal`, whose import takes ten times as long as
-the analysis of a session. A SciPy that is laid out otherwise is asked by its front door.
+the analysis of a session. `scipy.signal` itself is used where a SciPy has another layout.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ def low_pass(values: Array, cut_off: float, rate: float, padding: int) -> Array:
     """Return values (n, k) through a second-order Butterworth low-pass, forwards and then backwards.
 
     One pass is 3 dB down at `cut_off` [Hz], by the bilinear transform for readings at `rate` [Hz]. Both ends are
-    carried on by `padding` < n readings, turned about the end; the filter begins settled on the first of them.
+    extended by `padding` < n readings, by odd reflection; the filter starts in its steady state for the first of them.
     """
     warped = float(np.tan(np.pi * cut_off / rate))
     denominator = 1.0 + np.sqrt(2.0) * warped + warped * warped
@@ -36,7 +36,7 @@ def low_pass(values: Array, cut_off: float, rate: float, padding: int) -> Array:
         return signal.sosfiltfilt(sections, values, axis=0, padlen=padding)
     lead, trail = 2.0 * values[:1] - values[padding:0:-1], 2.0 * values[-1:] - values[-2 : -padding - 2 : -1]
     rows = np.ascontiguousarray(np.concatenate([lead, values, trail]).T)  # (k, n + 2 padding), filtered in place
-    state = np.array([1.0 - gain, gain - a2])  # what the filter holds of a value that never changed
+    state = np.array([1.0 - gain, gain - a2])  # the filter's state after constant input
     for _ in range(2):
         kernel(sections, rows, (rows[:, :1] * state)[:, None, :])
         rows = np.ascontiguousarray(rows[:, ::-1])
@@ -54,15 +54,15 @@ def _compiled_filter() -> Any:  # noqa: ANN401 - compiled, without types
     module = module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except ImportError:  # a SciPy whose libraries it must find first
+    except ImportError:  # a SciPy that must first locate its libraries
         return None
     return getattr(module, "_sosfilt", None)
 
 
 def peaks(values: Array) -> tuple[NDArray[np.intp], Array]:
-    """Return where values (n,) are greatest among their neighbours (p,), and how far each stands out of them (p,).
+    """Return the positions (p,) of local maxima of values (n,), and their prominences (p,).
 
-    A flat top counts once, in its middle; it stands out of the higher of both least values before a higher top or end.
+    A flat top counts once, at its middle. Prominence is above the higher of the minima before a higher top or end.
     """
     firsts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
     lasts = np.append(firsts[1:], len(values)) - 1
@@ -79,7 +79,7 @@ def peaks(values: Array) -> tuple[NDArray[np.intp], Array]:
 
 
 _AXES = {"x": 0, "y": 1, "z": 2}
-# -3 dB of a second-order Butterworth run forwards and backwards lies at its own -3 dB frequency divided by this.
+# -3 dB of a second-order Butterworth run forwards and backwards is at the -3 dB frequency of one pass divided by this.
 _TWO_PASSES = (np.sqrt(2.0) - 1.0) ** -0.25
 
 
@@ -92,7 +92,7 @@ class Filter:
 
     @property
     def sentence(self) -> str:
-        """What was done, for people."""
+        """Description of the filter, for people."""
         return (
             "zero-phase Butterworth low-pass, second order forwards and backwards, -3 dB of both passes together at "
             f"{self.cut_off:g} Hz; forces were filtered before the ratio was formed, and never across a gap"
@@ -101,7 +101,7 @@ class Filter:
     def apply(self, values: Array, rate: float, segments: list[slice]) -> Array:
         """Return values (n, k) filtered within each segment [positions]; nan outside them and in the shortest ones."""
         filtered = np.full_like(values, np.nan)
-        # The bilinear transform bends frequencies as the tangent does: the factor belongs to the bent ones.
+        # The bilinear transform warps frequencies by the tangent: the factor applies to warped ones.
         design = rate / np.pi * np.arctan(_TWO_PASSES * np.tan(np.pi * self.cut_off / rate))
         for segment in segments:
             length = segment.stop - segment.start
@@ -111,15 +111,15 @@ class Filter:
         return filtered
 
     def fits(self, rate: float) -> bool:
-        """Say whether readings at `rate` [Hz] are dense enough for it to do anything."""
+        """Say whether readings at `rate` [Hz] are dense enough for the filter."""
         return rate >= 2.5 * self.cut_off * _TWO_PASSES
 
 
 def in_face_frame(wrench: Array, frame: Frame) -> Array:
-    """Return the wrench (n, 6) [N, N mm] turned so that +z points out of the face, pressing is Fz < 0.
+    """Return the wrench (n, 6) [N, N mm] rotated so that +z points out of the face; pressing is Fz < 0.
 
-    "-z" leaves everything as it is; "-x" and "-y" rename the axes in their order (x y z -> y z x, z x y); a "+" normal
-    then turns by 180 degrees about the new x axis. All of these are rotations, so torques turn along.
+    "-z" changes nothing; "-x" and "-y" permute the axes cyclically (x y z -> y z x, z x y); a "+" normal then rotates
+    by 180 degrees about the new x axis. All of these are rotations, so torques rotate with the forces.
 
     >>> in_face_frame(np.array([[1.0, 2, 3, 4, 5, 6]]), Frame(normal="+z"))
     array([[ 1., -2., -3.,  4., -5., -6.]])
@@ -131,9 +131,9 @@ def in_face_frame(wrench: Array, frame: Frame) -> Array:
 
 
 def level(wrench: Array, lean: tuple[float, float]) -> Array:
-    """Return a wrench (n, 6) of the face frame turned so that +z is the normal of a face that leans [degrees].
+    """Return a wrench (n, 6) of the face frame rotated so that +z is the normal of a tilted face; `lean` [degrees].
 
-    A rotation by the shortest way, so torques turn along.
+    The smallest such rotation; torques rotate with the forces.
 
     >>> (level(np.array([[-1.0, 0, 0, 0, 0, 0]]), (90.0, 0.0)).round(9) + 0.0).tolist()
     [[0.0, 0.0, -1.0, 0.0, 0.0, 0.0]]
@@ -142,7 +142,7 @@ def level(wrench: Array, lean: tuple[float, float]) -> Array:
         return wrench
     x, y = np.radians(lean)
     angle = float(np.hypot(x, y))
-    axis = np.array([y, -x, 0.0]) / angle  # turns the normal back to z
+    axis = np.array([y, -x, 0.0]) / angle  # rotates the normal back to z
     skew = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
     rotation = np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * skew @ skew
     return np.hstack([wrench[:, :3] @ rotation.T, wrench[:, 3:] @ rotation.T])
@@ -154,9 +154,9 @@ def normal_force(wrench: Array, frame: Frame) -> Array:
 
 
 def centre_of_pressure(wrench: Array, height: float) -> Array:
-    """Return where the resultant meets the face (n, 2) [mm]: x = (Ty - h Fx)/N, y = -(Tx + h Fy)/N.
+    """Return the centre of pressure on the face (n, 2) [mm]: x = (Ty - h Fx)/N, y = -(Tx + h Fy)/N.
 
-    `wrench` (n, 6) is zeroed and in the face frame, `height` [mm] that of the face above the transducer's origin.
+    `wrench` (n, 6) is zeroed and in the face frame, `height` [mm] is the face's height above the transducer's origin.
     nan where nothing presses.
 
     >>> centre_of_pressure(np.array([[0.0, 0, -2, -6, 8, 0]]), 20.0)

@@ -1,4 +1,4 @@
-"""Which readings of a block can be used: what was lost, froze, clipped, repeats, spikes, or came at uneven times."""
+"""Usable readings of a block: losses, frozen and clipped sensors, repeats, spikes, uneven time steps."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from sessions.strokes.stroke import Flaw, FlawName, significant
 
 
 class Gap(NamedTuple):
-    """Where readings are missing or cannot be used."""
+    """A stretch of missing or unusable readings."""
 
     start: float  # last sound reading before it [s, device time]
     stop: float  # first one after it
@@ -29,7 +29,7 @@ class ConstantRun(NamedTuple):
     """A run of one axis at one value while the other axes move."""
 
     axis: int
-    clipped: bool  # at its own least or greatest value; else frozen
+    clipped: bool  # at the axis' least or greatest value; else frozen
     first: int  # reading
     last: int
     value: float  # raw
@@ -37,7 +37,7 @@ class ConstantRun(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SignalQuality:
-    """What a block's readings are worth; n of them."""
+    """Quality of the n readings of a block."""
 
     rate: float  # readings a second, from the median time step [Hz]
     even: bool  # the time steps are equal
@@ -45,12 +45,12 @@ class SignalQuality:
     saturated: Mask  # (n,)
     gaps: tuple[Gap, ...]
     segments: tuple[slice, ...]  # stretches of good readings without a gap
-    dead: tuple[str, ...]  # axes that never moved
+    dead: tuple[str, ...]  # axes that never changed
     flaws: tuple[Flaw, ...]
 
 
 def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: AnalysisSettings) -> SignalQuality:
-    """Judge a block of at least two readings."""
+    """Return the signal quality of a block of at least two readings."""
     steps = np.diff(block.time)
     forward_steps = steps[steps > 0.0]
     step = float(np.median(forward_steps)) if len(forward_steps) else np.nan
@@ -64,7 +64,7 @@ def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: Analysis
     stalls = np.concatenate([[False], steps <= 0.0])
     good = ~(frozen | saturated | wild | stalls)
     long_steps = (np.diff(block.sequence) == 1) & (steps > settings.signal.missing_step * step)
-    # A few long steps are readings that a stream without numbers lost; as many as this are another rate.
+    # A few long steps are losses of a stream without record numbers; more of them are another rate.
     other_rate = bool(long_steps.mean() > settings.signal.uneven)
     widest = float(np.percentile(forward_steps, 98)) if other_rate else step
     breaks = (np.diff(block.sequence) != 1) | (steps > settings.signal.missing_step * widest) | (steps <= 0.0)
@@ -114,7 +114,7 @@ def _gap(previous: slice, following: slice, time: Array, frozen: Mask, saturated
 def _reading_flaws(
     block: ReadingBlock, losses: int, repeats: Mask, frozen: Mask, saturated: Mask, table: StatusTable, refusal: float
 ) -> Iterator[Flaw]:
-    """Yield what is wrong with readings (n,) as a whole; from a share of frozen ones on all are refused."""
+    """Yield the flaws of readings (n,) as a whole; above a share of frozen ones all are refused."""
     if losses:
         share = 100 * losses / (losses + len(block))
         sentence = (
@@ -152,7 +152,7 @@ def _reading_flaws(
 
 
 def _axis_flaws(constant: tuple[ConstantRun, ...], wild: Mask, dead: tuple[str, ...], time: Array) -> Iterator[Flaw]:
-    """Yield which axes stuck, by the first run that shows it, had wild readings (n, 6), or never moved."""
+    """Yield flaws of axes that were frozen or clipped, had wild readings (n, 6), or never changed."""
     for axis, clipped in dict.fromkeys((run.axis, run.clipped) for run in constant):
         runs = [run for run in constant if (run.axis, run.clipped) == (axis, clipped)]
         duration = sum(float(time[run.last] - time[run.first]) for run in runs)
@@ -213,7 +213,7 @@ def doubtful_readings(recording: Recording) -> Iterator[str]:
 
 
 def spikes(raw: Array, settings: SignalSettings) -> Mask:
-    """Mark the wild readings of each axis (n, k): beyond all neighbours by far more than these differ themselves."""
+    """Mark the wild readings of each axis (n, k): far beyond all neighbours, relative to their own differences."""
     marks = np.zeros(raw.shape, np.bool_)
     for axis in range(raw.shape[1]):
         column = raw[:, axis]
@@ -228,7 +228,7 @@ def spikes(raw: Array, settings: SignalSettings) -> Mask:
             for width in range(1, settings.wild_widest + 1)
             for start in _candidates(np.diff(column), width, floor, settings).tolist()
         ]
-        suspect = np.zeros(len(column), np.bool_)  # these may be wild: none of them says what is usual around another
+        suspect = np.zeros(len(column), np.bool_)  # possibly wild readings do not count as usual neighbours
         for start, width in candidates:
             suspect[start : start + width] = True
         for start, width in candidates:
@@ -238,7 +238,7 @@ def spikes(raw: Array, settings: SignalSettings) -> Mask:
 
 
 def _candidates(steps: Array, width: int, floor: float, settings: SignalSettings) -> Indices:
-    """Return where `width` readings begin that steps of more than `floor` enter and leave, away from both ends."""
+    """Return starts of `width` readings entered and left by steps over `floor`, away from both ends."""
     jump, return_jump = steps[:-width], steps[width:]
     starts = np.flatnonzero((np.minimum(np.abs(jump), np.abs(return_jump)) > floor) & (jump * return_jump < 0.0)) + 1
     return starts[(starts >= settings.wild_neighbours) & (starts + width + settings.wild_neighbours <= len(steps) + 1)]
@@ -261,14 +261,14 @@ def _stands_out(column: Array, suspect: Mask, start: int, width: int, settings: 
 def constant_runs(time: Array, raw: Array, skip: Mask, settings: SignalSettings) -> tuple[ConstantRun, ...]:
     """Return the runs of one value on single axes of raw (n, k) at `time` (n,) [s].
 
-    A run counts where it is long against the runs that its axis shows elsewhere, so that coarse steps are no fault.
-    Readings to `skip` (n,) are no axis' greatest or least value.
+    A run counts if it is long relative to other runs of its axis, so that coarse steps are no fault. Readings to `skip`
+    (n,) do not count as an axis' greatest or least value.
     """
     return tuple(run for axis in range(raw.shape[1]) for run in _axis_runs(axis, time, raw, skip, settings))
 
 
 def constant_readings(raw: Array, runs: tuple[ConstantRun, ...], *, clipped: bool) -> Mask:
-    """Mark the readings (n,) of frozen runs; or, `clipped`, all those at a value at which an axis was clipped."""
+    """Mark the readings (n,) of frozen runs; or, if `clipped`, all readings at a value where an axis was clipped."""
     marks = np.zeros(len(raw), np.bool_)
     for run in runs:
         if clipped and run.clipped:
@@ -284,7 +284,7 @@ def _axis_runs(axis: int, time: Array, raw: Array, skip: Mask, settings: SignalS
     lasts = np.concatenate([firsts[1:], [len(column)]]) - 1
     lengths = lasts - firsts + 1
     durations = time[lasts] - time[firsts]
-    # Times are sums of ticks, so a run as long as the limit may seem a little shorter.
+    # Times are sums of ticks, so a run at the limit may seem slightly shorter.
     candidates = np.flatnonzero((lengths >= settings.flat_readings) & (durations > settings.flat_top - 1e-9))
     if not len(candidates) or len(firsts) == 1:
         return []
@@ -296,7 +296,7 @@ def _axis_runs(axis: int, time: Array, raw: Array, skip: Mask, settings: SignalS
         spans = [(int(firsts[run]), int(lasts[run])) for run in runs]
         others_live = np.array([_others_move(axis, time, raw, span, settings) for span in spans])
         live_runs = runs[others_live]
-        if durations[live_runs].sum() <= durations[runs].sum() / 2.0:  # what the axis reads where nothing presses
+        if durations[live_runs].sum() <= durations[runs].sum() / 2.0:  # the axis' unloaded value
             continue
         for run in live_runs.tolist():
             clipped = value in extremes
@@ -309,7 +309,7 @@ def _axis_runs(axis: int, time: Array, raw: Array, skip: Mask, settings: SignalS
 
 
 def _usual_length(lengths: Indices) -> float:
-    """Return the length of run that nine tenths of all readings do not exceed; without readings none is unusual."""
+    """Return the run length below which nine tenths of all readings lie; infinity without readings."""
     if not len(lengths):
         return np.inf
     ascending = np.sort(lengths)
@@ -317,7 +317,7 @@ def _usual_length(lengths: Indices) -> float:
 
 
 def _jumps(column: Array, start: int, stop: int, settings: SignalSettings) -> bool:
-    """Say whether a run begins or ends by more than a few of its axis' least steps: a slow turn does neither."""
+    """Say whether a run begins or ends with a jump of several least steps, unlike a slow reversal."""
     steps = np.abs(np.diff(column))
     least_step = float(steps[steps > 0.0].min())
     edges = [float(steps[step]) for step in (start - 1, stop) if 0 <= step < len(steps)]
@@ -325,7 +325,7 @@ def _jumps(column: Array, start: int, stop: int, settings: SignalSettings) -> bo
 
 
 def _others_move(axis: int, time: Array, raw: Array, run: tuple[int, int], settings: SignalSettings) -> bool:
-    """Say whether other axes live during a run, and some of them moves by more than its noise around it."""
+    """Say whether other axes change during a run, and one of them moves by more than its noise around it."""
     start, stop = run
     other_axes = np.delete(raw, axis, axis=1)
     alive = (np.diff(other_axes[start : stop + 1], axis=0) != 0.0).any(axis=1)
@@ -352,17 +352,17 @@ def repeated_readings(block: ReadingBlock, settings: SignalSettings) -> Mask:
             jumped = not len(jumps) or bool(jumps[max(start - 1, 0) : start].any() or jumps[stop : stop + 1].any())
             at_end = stop == len(block) - 1
             displaced = np.abs(block.raw[rests] - block.raw[start]) > settings.frozen_off * np.ptp(block.raw, axis=0)
-            # Where some axis lies far from where it lay in each rest before it is pressed, or was.
+            # A value far from every earlier rest on some axis is under load.
             frozen[start + 1 : stop + 1] = jumped or (at_end and bool(rests) and bool(displaced.any(axis=1).all()))
             rests += [] if frozen[stop] else [start]
     return frozen
 
 
 def _coarse_jumps(raw: Array, settings: SignalSettings) -> Mask:
-    """Mark the steps (n - 1,) that no axis in coarse steps makes by itself; empty where the steps are fine.
+    """Mark the steps (n - 1,) that are jumps on a coarsely quantised axis; empty where steps are fine.
 
-    Steps are coarse where an axis that changes does so by its least step or little more: at rest such a sensor repeats
-    all six numbers, and leaves them step by step, where a frozen one that lives again jumps.
+    Steps are coarse where an axis changes mostly by its least step or little more: at rest such a sensor repeats all
+    six numbers and leaves them step by step, whereas a frozen sensor that recovers jumps.
     """
     steps = np.abs(np.diff(raw, axis=0))
     changes = [column[column > 0.0] for column in steps.T]
@@ -374,7 +374,7 @@ def _coarse_jumps(raw: Array, settings: SignalSettings) -> Mask:
 
 
 def saturated_readings(block: ReadingBlock, info: TransducerInfo) -> Mask:
-    """Mark readings the device called invalid, and those outside the rated range, where one is stated."""
+    """Mark readings that the device reported as invalid, and those outside a stated rated range."""
     calibration = info.calibration
     wrench = calibration.in_own_frame(calibration.wrench(block.raw, np.zeros(6)))
     return info.status.doubtful(block.status) | (np.abs(wrench) > calibration.rated).any(axis=1)

@@ -1,4 +1,4 @@
-"""The steady slide of a stroke: its window, mean and interval, speed and direction, and what forbids them."""
+"""The steady slide of a stroke: its window, speed and direction, and the flaws that withhold them."""
 
 from typing import NamedTuple
 
@@ -10,17 +10,17 @@ from sessions.strokes.span import Span, Track, mean_vector
 from sessions.strokes.stroke import COEFFICIENTS, DIRECTION, SPEED, Findings, FlawName, significant
 
 _QUARTERS = 4
-_ROUNDING = 1e-9  # instants are known to the last bit, or rounded by people [s]
+_ROUNDING = 1e-9  # instants of people may be rounded [s]
 
 
 def steady_window(ratio: Array, rate: float, readings: int, settings: AnalysisSettings) -> slice | None:
-    """Return the stretch over which T/N is steady, by the rule the settings name, or None.
+    """Return the stretch over which T/N is steady, by the rule of the settings, or None.
 
-    `ratio` (n,) [-] is nan where the finger does not slide or T/N means nothing; the stroke has so many `readings`.
-    Steady: the standard deviation is below 10 % of the mean and no quarter's mean lies more than 5 % from
-    it (settings), beyond what the scatter of few readings explains. Of the steady stretches half as long as the slide
-    that of least variance is taken as it is ("least variance"), or widened to the longest steady stretch that holds it
-    ("widened"). "middle half" and "whole slide" ask for no steadiness.
+    `ratio` (n,) [-] is nan where the finger does not slide or T/N is undefined; the stroke has `readings` readings.
+    Steady: the standard deviation is below 10 % of the mean and no quarter's mean differs by more than 5 % (settings)
+    beyond the scatter of few readings. Of the steady stretches half as long as the slide, the one of least variance is
+    returned ("least variance"), or widened to the longest steady stretch that contains it ("widened"). "middle half"
+    and "whole slide" require no steadiness.
     """
     rule = settings.steady
     shortest = max(rule.steady_share * readings, rule.steady_shortest * rate, rule.steady_readings)
@@ -45,7 +45,7 @@ def steady_window(ratio: Array, rate: float, readings: int, settings: AnalysisSe
 
 
 def _stretches(ratio: Array, shortest: float, rule: SteadySettings) -> tuple[Indices, Indices, Array, Mask]:
-    """Return where each sliding stretch of a grid begins and ends, the variance of T/N in it, and if it is steady."""
+    """Return start, stop, variance of T/N and steadiness of each sliding stretch of a grid."""
     edges = np.unique(np.linspace(0, len(ratio), rule.steady_edges).round().astype(int))
     finite = np.isfinite(ratio)
     value = np.where(finite, ratio, 0.0)
@@ -65,9 +65,9 @@ def _stretches(ratio: Array, shortest: float, rule: SteadySettings) -> tuple[Ind
 
 
 def _least_varying(length: Indices, variance: Array, steady: Mask, shortest: float, grid: float) -> int:
-    """Return which steady stretch of about the `shortest` length varies least; of the longest, where none is as long.
+    """Return the index of the least varying steady stretch of about the `shortest` length, or the longest if shorter.
 
-    Lengths within a step of the `grid` are alike.
+    Lengths within a step of the `grid` count as equal.
     """
     long_enough = length[steady & (length >= shortest)]
     least_length = int(long_enough.min()) if len(long_enough) else int(length[steady].max())
@@ -76,7 +76,7 @@ def _least_varying(length: Indices, variance: Array, steady: Mask, shortest: flo
 
 
 def _trim(ratio: Array, window: slice, settings: AnalysisSettings) -> slice:
-    """Return the window without those ends that lie off its median; a mean over a quarter hides the end of a ramp."""
+    """Return the window without ends that lie off its median: a quarter's mean hides the end of a ramp."""
     ratios = ratio[window]
     level = float(np.nanmedian(ratios))
     scatter = 1.4826 * float(np.nanmedian(np.abs(ratios - level)))
@@ -104,7 +104,7 @@ def movement(time: Array, position: Array, rate: float, settings: AnalysisSettin
     slope = t @ deviations / spread
     residuals = deviations - t[:, None] * slope
     speed = float(np.hypot(*slope))
-    # Scatter along the path is what makes the speed uncertain.
+    # Only scatter along the path makes the speed uncertain.
     direction = slope / speed if speed > 0.0 else np.array([1.0, 0.0])
     error = float(np.sqrt(((residuals @ direction) ** 2).sum() / (len(blocks) - 2) / spread))
     variance = float((deviations**2).sum())
@@ -113,7 +113,7 @@ def movement(time: Array, position: Array, rate: float, settings: AnalysisSettin
 
 
 def displacement(position: Array) -> float:
-    """Return how far position (n, 2) [mm] moves from the first to the last fifth of its readings; nan if not known."""
+    """Return the movement of position (n, 2) [mm] from the first to the last fifth of its readings; nan if unknown."""
     finite = position[np.isfinite(position).all(axis=1)]
     fifth = max(1, len(finite) // 5)
     if len(finite) < 2 * fifth:
@@ -130,10 +130,10 @@ def block_means(values: Array, rate: float, settings: AnalysisSettings) -> Array
 
 
 def slide(findings: Findings, span: Span, track: Track, uncut: Track, interval: Pair | None) -> slice | None:
-    """Find the steady window and the speed in it; None, with the reason, where nothing slides steadily.
+    """Return the steady window and record its speed; None, with a flaw, where nothing slides steadily.
 
-    The window of an `interval` [s, device clock] that a person decided is taken, with its flaws. `uncut` is the contact
-    that turns cut the stroke out of, the stroke itself where none did.
+    An `interval` [s, device clock] decided by a person is used as the window, with its flaws. `uncut` is the whole
+    contact before reversals cut it, or the stroke itself.
     """
     window, settings = None, track.settings
     if interval is not None:
@@ -146,7 +146,7 @@ def slide(findings: Findings, span: Span, track: Track, uncut: Track, interval: 
         sliding = np.where(track.speed >= limit, track.ratio, np.nan)
         window = steady_window(sliding, track.rate, len(track.time), settings)
     motion, trouble = _speed(span, track, window)
-    if trouble is not None and interval is None:  # the centre of pressure does not show when the finger slides
+    if trouble is not None and interval is None:  # the centre of pressure does not show the slide
         window = steady_window(track.ratio, track.rate, len(track.time), settings)
         motion, trouble = _speed(span, track, window)
     refusal = _refusal(span, track, uncut, window)
@@ -176,7 +176,7 @@ def slide(findings: Findings, span: Span, track: Track, uncut: Track, interval: 
 
 
 def _refusal(span: Span, track: Track, uncut: Track, window: slice | None) -> tuple[FlawName, str] | None:
-    """Say why nothing shows that the contact slides over a window, or None where it does."""
+    """Return the flaw of a window without evidence of a slide; None where there is evidence."""
     if window is None:
         return None
     position, limits = track.position[window], track.settings.slide
@@ -200,9 +200,9 @@ def _refusal(span: Span, track: Track, uncut: Track, window: slice | None) -> tu
 
 
 def _roll_flaw(track: Track, uncut: Track, level: float) -> tuple[FlawName, str] | None:
-    """Return the flaw of a centre of pressure that moves no further than a finger rolls; None where it moves further.
+    """Return the flaw of a centre of pressure that moves no further than by rolling; None where it moves further.
 
-    It counts over the `uncut` contact where T/N lies about its `level` while steady: nothing slips below that.
+    The movement counts in the `uncut` contact where T/N is near its steady `level`: below it nothing slips.
     """
     settings = track.settings
     slipping = np.abs(uncut.ratio - level) <= 2.0 * settings.steady.steady_spread * level
@@ -217,7 +217,7 @@ def _roll_flaw(track: Track, uncut: Track, level: float) -> tuple[FlawName, str]
 
 
 def _speed(span: Span, track: Track, window: slice | None) -> tuple[Movement | None, tuple[FlawName, str] | None]:
-    """Return the movement over a window, and why it gives no speed, None where it does."""
+    """Return the movement over a window, and the flaw that withholds its speed, if any."""
     name = FlawName.SPEED_NOT_MEASURABLE
     if window is None:
         return None, (name, "")
@@ -249,7 +249,7 @@ def _speed(span: Span, track: Track, window: slice | None) -> tuple[Movement | N
 
 
 def _slide_onset(findings: Findings, track: Track, motion: Movement) -> None:
-    """Give the first instant from which the centre of pressure keeps a share of its steady speed."""
+    """Record the first instant from which the centre of pressure keeps a share of its steady speed."""
     start = int(np.searchsorted(track.time, float(findings.numbers["steady"][0])))
     slow = ~(track.speed[: start + 1] >= track.settings.slide.slide_share * motion.speed)
     onset = int(np.flatnonzero(slow)[-1]) + 1 if slow.any() else 0
@@ -260,11 +260,11 @@ def _slide_onset(findings: Findings, track: Track, motion: Movement) -> None:
 def slide_onset_draws(
     time: Array, speed: Array, least_speed: Array, noise: Array, draw: np.random.Generator
 ) -> Array | None:
-    """Return from when the centre of pressure may have slid (repeats,) [s]; None where its speed is not known.
+    """Return draws of the slide's onset (repeats,) [s]; None where the speed is unknown.
 
-    `speed` (n,) [mm/s] at `time` (n,) [s], from the contact's onset on, reaches to the steady window; `least_speed` is
-    that at which the slide has begun, `noise` how wrong that of the centre of pressure may be (repeats,) [mm/s]. Where
-    it was as fast as that when its speed was first known, it may have begun to slide at any instant before.
+    `speed` (n,) [mm/s] at `time` (n,) [s] covers the contact's onset to the steady window. `least_speed` is the speed
+    at which the slide has begun, `noise` the error of the measured speed (repeats,) [mm/s]. Where the first known speed
+    exceeds that, the slide may have begun at any earlier instant.
     """
     slow = np.flatnonzero(~np.isfinite(speed))
     start = int(slow[-1]) + 1 if len(slow) else 0
@@ -276,7 +276,7 @@ def slide_onset_draws(
 
 
 def _side_load(findings: Findings, track: Track, window: slice, motion: Movement) -> None:
-    """Name a drag that does not lie along the movement: friction alone opposes it."""
+    """Record a flaw for a drag across the movement: friction alone acts along it."""
     drag = mean_vector(track.wrench[window, :2])
     along = np.array(motion.along) / motion.speed
     across = float(abs(drag[0] * along[1] - drag[1] * along[0]))
@@ -290,7 +290,7 @@ def _side_load(findings: Findings, track: Track, window: slice, motion: Movement
 
 
 def _direction(findings: Findings, track: Track, window: slice, motion: Movement | None) -> None:
-    """Give the direction along x: from the movement, else from the drag, which points the way the finger moves."""
+    """Record the direction along x: from the movement, else from the drag, which points along the movement."""
     drag, share = mean_vector(track.wrench[window, :2]), track.settings.slide.along_share
     drag_sign = int(np.sign(drag[0])) if abs(drag[0]) >= share * np.hypot(*drag) else None
     movement_sign = None

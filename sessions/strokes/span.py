@@ -1,4 +1,4 @@
-"""The readings of one trial made ready, where nothing presses in them, and those of one contact with its zero."""
+"""Prepared readings of one trial, its unloaded stretches, and the readings of one contact with its zero."""
 
 from dataclasses import dataclass, replace
 
@@ -17,7 +17,7 @@ from sessions.strokes.stroke import FlawName, StrokeCurve
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Zero:
-    """What the transducer reads with nothing touching."""
+    """The transducer's wrench with nothing touching."""
 
     start: float  # of the stretch it was taken from [s, device time]
     stop: float
@@ -27,7 +27,7 @@ class Zero:
 
     @property
     def period(self) -> str:
-        """The stretch, for people."""
+        """The stretch of time, for people."""
         return f"{self.start:.3f} to {self.stop:.3f} s"
 
 
@@ -64,7 +64,7 @@ class QuietWindows:
 
 
 def quiet_windows(time: Array, wrench: Array, rate: float, settings: AnalysisSettings) -> QuietWindows:
-    """Return where a wrench (n, 6) [N, N mm; face frame] at `time` (n,) [s] is unloaded."""
+    """Return the unloaded windows of a wrench (n, 6) [N, N mm; face frame] at `time` (n,) [s]."""
     length = max(settings.detector.baseline_readings, round(settings.detector.baseline * rate))
     if len(wrench) < length:
         return QuietWindows(time, wrench, np.empty((0, 2), np.int64))
@@ -73,7 +73,7 @@ def quiet_windows(time: Array, wrench: Array, rate: float, settings: AnalysisSet
     low, high = np.percentile(-wrench[:, 2], [0.5, 99.5])
     floor = max(settings.detector.quiet_floor, settings.zero.quiet_share * float(high - low))
     quiet = (spread <= np.maximum(settings.detector.quiet_noise * noise, floor)).all(axis=1)
-    # A finger that slides with a steady force moves the centre of pressure, and with it the torques alone.
+    # A finger that slides with a steady force changes the torques alone, by the centre of pressure.
     torque_spread, torque_noise = _spread(wrench[:, 3:5], starts, length)
     torque_limit = settings.zero.quiet_moves * float(high - low)
     quiet &= (torque_spread <= np.maximum(settings.detector.quiet_noise * torque_noise, torque_limit)).all(axis=1)
@@ -103,11 +103,11 @@ class Span:
     wrench: Array  # (n, 6) face frame, as measured, not zeroed [N, N mm]
     smooth: Array  # (n, 6) the same, filtered; nan in stretches too short for the filter
     rate: float  # [Hz]
-    filtered: str  # what the filter did
+    filtered: str  # description of the filter
     windows: QuietWindows
     quality: SignalQuality
     saturation_times: Array  # times of readings left out because they were saturated [s]
-    torque_step: float  # least step of a torque [N mm]; 0 where it is too fine to matter
+    torque_step: float  # least step of a torque [N mm]; 0 where it is negligible
     frame: Frame  # of the face, in which the wrench is
     settings: AnalysisSettings
 
@@ -144,29 +144,29 @@ def span_of(
 
 
 def _least_step(torques: Array) -> float:
-    """Return the least step between different readings of a torque, if steps are few enough to be seen."""
-    # Where most values come more than once the steps are the sensor's own.
+    """Return the least step between different readings of a torque, 0 where the steps are too fine to see."""
+    # Where most values repeat, the steps are those of the sensor.
     levels = (column for column in map(np.unique, torques.T) if 1 < len(column) < len(torques) / 2)
     return max((float(np.median(np.diff(column))) for column in levels), default=0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StrokeZero:
-    """The zero that a stroke is measured from."""
+    """The zero of a stroke."""
 
     level: Array  # (6,) face frame [N, N mm]
     noise: Array  # (6,) [N, N mm]
     filtered: Array  # (3,) noise of the filtered forces [N]
-    lasts: float  # of what the noise was estimated from [s]
+    lasts: float  # duration of the stretch that gave the noise [s]
     error: Array  # (6,) standard uncertainty of the level during the stroke [N, N mm]
-    origin: str = ""  # where it came from, for people
-    drift: Array | None = None  # (6,) after minus before; None where one of the two was not seen
-    unsure: tuple[float, float] = (0.0, 0.0)  # how far unloaded forces near it lie off: sideways, along the normal [N]
+    origin: str = ""  # its source, for people
+    drift: Array | None = None  # (6,) after minus before; None where one of them is missing
+    unsure: tuple[float, float] = (0.0, 0.0)  # deviation of nearby unloaded forces: sideways, along the normal [N]
     flaw: FlawName | None = None
 
 
 def zero_for(span: Span, contact: Contact, idle: Mask) -> StrokeZero | None:
-    """Return a stroke's zero from unloaded stretches around it, if any; nothing presses where `idle` (n,) is set."""
+    """Return a stroke's zero from unloaded stretches around it, if any; `idle` (n,) marks unloaded readings."""
     onset, lift, longest = contact.onset, contact.lift, span.settings.zero.zero_stretch
     earlier = None if onset is None else span.windows.zero_before(onset, longest)
     following = None if lift is None else span.windows.zero_after(lift, longest)
@@ -175,8 +175,8 @@ def zero_for(span: Span, contact: Contact, idle: Mask) -> StrokeZero | None:
         return None
     level, error, drift, flaw = zero.level, zero.error, None, None
     if earlier is not None and following is not None:
-        # Taken to be half-way; it may lie anywhere between the two, hence a rectangular distribution's deviation. What
-        # noise alone makes of the difference is no drift.
+        # The zero is taken half-way; it is uniformly distributed between the two, hence a rectangular distribution's
+        # deviation. A difference within the noise is no drift.
         drift = following.level - earlier.level
         level = earlier.level + drift / 2.0
         noise = earlier.error**2 + following.error**2
@@ -194,7 +194,7 @@ def zero_for(span: Span, contact: Contact, idle: Mask) -> StrokeZero | None:
 
 
 def _unsure(span: Span, contact: Contact, idle: Mask, level: Array, drift: Array | None) -> tuple[float, float]:
-    """Return how far from a zero the forces lie near a contact where nothing presses, and in valleys at its ends."""
+    """Return the deviation from zero of unloaded forces near a contact, and of forces in valleys at its ends."""
     first, last, margin = span.time[contact.start], span.time[contact.stop - 1], span.settings.zero.near
     nearby = idle & (span.time >= first - margin) & (span.time <= last + margin)
     nearby[list(contact.valleys)] = True
@@ -208,7 +208,7 @@ def _unsure(span: Span, contact: Contact, idle: Mask, level: Array, drift: Array
 
 
 def recorded_zero(span: Span, *, is_stated: bool) -> StrokeZero:
-    """Return the recording's own zero, which counts only where somebody stated that nothing touched when it was set."""
+    """Return the recording's own zero; flawed unless somebody stated that nothing touched when it was set."""
     steps = np.abs(np.diff(span.wrench, axis=0))
     noise = NORMAL_STEP * np.median(steps, axis=0) if len(steps) else np.zeros(6)
     origin = "as recorded, stated to be true" if is_stated else "as recorded, unknown"
@@ -218,7 +218,7 @@ def recorded_zero(span: Span, *, is_stated: bool) -> StrokeZero:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """The filtered readings of one contact; n of them. nan where a value means nothing."""
+    """The filtered readings of one contact; n of them. nan where a value is undefined."""
 
     time: Array  # (n,) [s]
     wrench: Array  # (n, 6) zeroed, face frame
@@ -233,7 +233,7 @@ class Track:
 
 
 def track_of(span: Span, contact: Contact, zero: StrokeZero) -> Track:
-    """Return the readings of a contact, zeroed, with what follows from them."""
+    """Return the zeroed readings of a contact, with the quantities derived from them."""
     stretch = slice(contact.start, contact.stop)
     wrench = span.smooth[stretch] - zero.level
     normal = -wrench[:, 2]
@@ -251,7 +251,7 @@ def track_of(span: Span, contact: Contact, zero: StrokeZero) -> Track:
 
 
 def mean_vector(vectors: Array) -> Array:
-    """Return the mean (k,) of vectors (n, k), leaving out nan; nan of none."""
+    """Return the mean (k,) of vectors (n, k), leaving out nan; nan without any."""
     finite = vectors[np.isfinite(vectors).all(axis=1)]
     return np.asarray(finite.mean(axis=0) if len(finite) else np.full(vectors.shape[1], np.nan), np.float64)
 
@@ -273,7 +273,7 @@ def _speed(time: Array, position: Array, span: Span) -> Array:
 
 
 def unfiltered_forces(span: Span, stretch: slice, zero: StrokeZero) -> tuple[Array, Array]:
-    """Return the tangential and the normal force (n,) [N] of a part, zeroed and unfiltered."""
+    """Return the tangential and the normal force (n,) [N] of a stretch, zeroed and unfiltered."""
     wrench = span.wrench[stretch] - zero.level
     return np.hypot(wrench[:, 0], wrench[:, 1]), -wrench[:, 2]
 
@@ -285,9 +285,9 @@ def noise_of_ratio(zero: StrokeZero, level: float, normal: float) -> float:
 
 
 def curve_of(span: Span, contact: Contact, zero: StrokeZero, crest_gap: float | None = None) -> StrokeCurve:
-    """Return the stroke's course with some time around it.
+    """Return the stroke's curve with some time around it.
 
-    `crest_gap` [N] is how far readings may miss the greatest force of a contact that sticks and slips, None of another.
+    `crest_gap` [N] is how far readings may miss the peak force in stick-slip, None without it.
     """
     around = span.settings.contact
     start = int(np.searchsorted(span.time, float(span.time[contact.start]) - around.curve_before))

@@ -1,10 +1,10 @@
-"""Where the stick phase ends, the break-away: the change point at which T/N stops climbing.
+"""The break-away, the end of the stick phase: the change point at which T/N stops climbing.
 
-Pushed against a surface that holds it, a finger's T/N rests, climbs until the contact slips, and then stays, or falls
-to where it stays if static friction is the greater. Rest, climb and level are fitted by least squares (two-phase
-regression: Hinkley 1969, Biometrika 56:495). A climb is straight unless the readings say that it bends, as it does
-where the contact's edge slips before its middle: by a power of the time that is left, 3/2 for a sphere dragged steadily
-(Mindlin and Deresiewicz 1953, J. Appl. Mech. 20:327).
+When a finger is pushed along a surface that holds it, T/N rests, climbs until the contact slips, and then stays, or
+falls to a level if static friction is greater. Rest, climb and level are fitted by least squares (two-phase regression:
+Hinkley 1969, Biometrika 56:495). A climb is straight unless the readings show a bend, as where the contact's edge slips
+before its middle: by a power of the remaining time, 3/2 for a sphere dragged steadily (Mindlin and Deresiewicz 1953, J.
+Appl. Mech. 20:327).
 """
 
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ from sessions.strokes.sliding import block_means
 
 
 class Climb(NamedTuple):
-    """A rest, a climb and a level, and what of a peak stands above the level."""
+    """A rest, a climb and a level, with or without a peak above the level."""
 
     begins: float  # instant at which the climb leaves the rest [s]
     meets: float  # instant at which it stops [s]
     bend: float  # 1 is straight [-]
-    fall: float  # in which what is above the level falls to 1/e; 0 where there is no peak [s]
+    fall: float  # time in which the peak falls to 1/e; 0 without a peak [s]
     rest: float  # [-]
     rise: float  # from rest to level [-]
     peak: float  # above the level [-]
@@ -34,7 +34,7 @@ class Climb(NamedTuple):
         return self.rest + _progress_and_peak(self, time) @ np.array([self.rise, self.peak])
 
     def slopes(self, time: Array) -> Array:
-        """Return how T/N changes with each of the seven numbers (n, 7) at `time` (n,) [s], 0 if it has none."""
+        """Return the derivatives of T/N by the seven numbers (n, 7) at `time` (n,) [s], 0 for unused ones."""
         duration = self.meets - self.begins
         remaining = np.clip((self.meets - time) / duration, 0.0, 1.0)
         inside = (remaining > 0.0) & (remaining < 1.0)
@@ -55,10 +55,10 @@ class Climb(NamedTuple):
 
 
 def break_away(time: Array, ratio: Array, settings: AnalysisSettings, *, peaked: bool = False) -> float | None:
-    """Return the instant [s] at which T/N (n,) [-] stops climbing; None where it does not climb first.
+    """Return the instant [s] at which T/N (n,) [-] stops climbing; None without a climb before.
 
-    `time` (n,) [s] reaches from the contact to the end of the steady window; nan of the ratio is left out. `peaked`
-    where a static peak was found. A climb explains most of what a level alone leaves, and rises by `stick_rise` of it.
+    `time` (n,) [s] covers contact to end of the steady window; nan of the ratio is left out. `peaked` is true with a
+    static peak. The climb must explain most of the variance about a constant, and rise by `stick_rise` of its level.
     """
     finite = np.isfinite(ratio)
     limit = settings.climb.climb_most
@@ -71,7 +71,7 @@ def break_away(time: Array, ratio: Array, settings: AnalysisSettings, *, peaked:
 
 
 def thin(column: Array, limit: int) -> Array:
-    """Return readings, or where there are more than `limit` of them, means of as many neighbours each."""
+    """Return readings, or for more than `limit` of them the means of equally many neighbours each."""
     edges = np.arange(0, len(column), -(-len(column) // limit))
     return np.add.reduceat(column, edges) / np.diff(np.append(edges, len(column))) if len(column) else column
 
@@ -85,9 +85,9 @@ class ClimbReadings:
     settings: ClimbSettings
 
     def fit(self, block: float, *, peaked: bool) -> Climb | None:
-        """Return the climb that the readings have had; None of too few readings.
+        """Return the fitted climb; None for too few readings.
 
-        A straight one, unless one that bends is surely nearer; readings are alike over `block` [s]. `peaked` ones fall.
+        It is straight unless a bent one fits much better; readings correlate over `block` [s]. `peaked` ones fall.
         """
         if len(self.time) < 2 * self.settings.climb_fewest + 1:
             return None
@@ -101,7 +101,7 @@ class ClimbReadings:
         return bent if gain * dof > self.settings.climb_bends_surely * least else straight
 
     def refine(self, climb: Climb, *, bends: bool = False) -> Climb:
-        """Return the climb near a first one that leaves least of the readings (Levenberg 1944, Marquardt 1963)."""
+        """Return the least-squares climb, from an initial one (Levenberg 1944, Marquardt 1963)."""
         slopes, residual, damping = climb.slopes(self.time), self.ratio - climb.ratio(self.time), 1e-3
         for _ in range(self.settings.climb_steps):
             free = self.free_numbers(climb, slopes, residual, bends=bends)
@@ -122,9 +122,9 @@ class ClimbReadings:
         return climb
 
     def free_numbers(self, climb: Climb, slopes: Array, residual: Array, *, bends: bool) -> list[int]:
-        """Return the positions of the numbers of a climb that the readings can move, by what it leaves of them (n,).
+        """Return the positions of the free parameters of a climb, given its residual (n,).
 
-        A climb that begins with the first reading can only begin later.
+        A climb that begins at the first reading can only begin later.
         """
         later = float(slopes[:, 0] @ residual) > 0.0
         free = [1, 4, 5]
@@ -133,7 +133,7 @@ class ClimbReadings:
         return sorted(free + ([3, 6] if climb.fall > 0.0 else []))
 
     def mean_square(self, climb: Climb) -> float:
-        """Return the mean square of what a climb leaves of T/N [-]."""
+        """Return the mean square of a climb's residuals of T/N [-]."""
         return float(((self.ratio - climb.ratio(self.time)) ** 2).mean())
 
     def _straight(self) -> tuple[float, float]:
@@ -150,7 +150,7 @@ class ClimbReadings:
         return float(begins[best]), float(meets[best])
 
     def _guess(self, interval: tuple[float, float], bend: float, fall: float) -> Climb:
-        """Return a climb of a kind between two instants, its heights fitted."""
+        """Return a climb with a bend and a fall between two instants, with fitted heights."""
         latest = float(self.time[-self.settings.climb_fewest - 1])
         begins, meets = interval
         meets = min(meets + (bend - 1.0) * (meets - begins), latest)
@@ -171,17 +171,17 @@ class ClimbReadings:
 
 
 def _clip(number: float, low: float, high: float) -> float:
-    return min(max(number, low), high)  # twenty times as fast as NumPy's of one number
+    return min(max(number, low), high)  # twenty times as fast as NumPy's clip of one number
 
 
 def _progress_and_peak(fit: Climb, t: Array) -> Array:
-    """Return how much of the climb is done, and of the peak there (n, 2) [-]."""
+    """Return the progress of the climb and the remaining peak (n, 2) [-]."""
     progress = 1.0 - np.clip((fit.meets - t) / (fit.meets - fit.begins), 0.0, 1.0) ** fit.bend
     return np.column_stack([progress, progress * _peak_decay(fit, t)])
 
 
 def _peak_decay(fit: Climb, t: Array) -> Array:
-    """Return what is left of the peak (n,) [-]: 1 up to it."""
+    """Return the decay of the peak (n,) [-]: 1 up to the peak."""
     return np.exp(-np.maximum(t - fit.meets, 0.0) / fit.fall) if fit.fall > 0.0 else np.zeros_like(t)
 
 
@@ -194,13 +194,13 @@ def break_away_draws(
     *,
     peaked: bool,
 ) -> Array | None:
-    """Return where T/N may have stopped climbing (repeats,) [s]; None where there are too few readings.
+    """Return draws of the break-away (repeats,) [s]; None for too few readings.
 
-    The readings' deviations from the fit are kept in place and turned by a random factor a block (a wild bootstrap: Wu
-    1986, Ann. Statist. 14:1261), since noise of T/N is greatest where N is least, and N climbs too.
-    `columns` are time [s], T/N [-] and N [N] (n,) from the contact to the end of the steady window; the fit ends at one
-    of some instants from there back to `shortest` [s]. `zero` is how wrong the zero of T and of N may be (repeats,)
-    [N]. `peaked` where a static peak was found. A repeat's deviations move the break-away as the fit, to first order.
+    Residuals are kept in place and multiplied by a random factor for each block (a wild bootstrap: Wu 1986, Ann.
+    Statist. 14:1261), since noise of T/N is greatest where N is least, and N climbs too. `columns` are time [s], T/N
+    [-] and N [N] (n,) from the contact to the end of the steady window; the fit ends at one of some instants from there
+    back to `shortest` [s]. `zero` is the error of the zero of T and of N (repeats,) [N]. `peaked` is true with a static
+    peak. Residuals move the break-away to first order, as in the fit.
     """
     last_instant = float(columns[0][-1])
     finite = np.isfinite(columns[1])
@@ -223,7 +223,7 @@ def break_away_draws(
             return None
         edges = np.flatnonzero(np.diff(np.floor((t - t[0]) / settings.block), prepend=-1.0))
         blocks = float(np.searchsorted(t[edges], fit.meets) - np.searchsorted(t[edges], fit.begins))
-        # Two or three numbers were fitted to the climb's few blocks: residuals are small, and their size is uncertain.
+        # Two or three parameters are fitted to the climb's few blocks: residuals are small and their size uncertain.
         dof = max(blocks - 2.0 - bends, 1.0)
         scale = np.sqrt(max(blocks, 1.0) / draw.chisquare(dof, len(repeats)))[:, None]
         factors = scale * draw.standard_normal((len(repeats), len(edges)))
@@ -237,14 +237,14 @@ def break_away_draws(
 
 
 class StickSlip(NamedTuple):
-    """A contact that sticks and slips."""
+    """Stick-slip of a contact."""
 
     frequency: float  # of the slips [Hz]
-    crest_gap: float  # how far T/N climbs from one reading to the next: readings may miss a crest by it [-]
+    crest_gap: float  # climb of T/N between readings: they may miss a crest by it [-]
 
 
 def stick_slip(time: Array, ratio: Array, noise: float, settings: AnalysisSettings) -> StickSlip | None:
-    """Return how a contact sticks and slips, by unfiltered T/N (n,) [-] at `time` (n,) [s]; None where it does not.
+    """Return the stick-slip in unfiltered T/N (n,) [-] at `time` (n,) [s]; None without one.
 
     `noise` is the standard deviation of T/N [-].
     """
@@ -256,7 +256,7 @@ def stick_slip(time: Array, ratio: Array, noise: float, settings: AnalysisSettin
     change = ratio[lag:] - ratio[:-lag]
     threshold = max(limits.slip_share * float(np.nanmedian(ratio)), limits.slip_noise * np.sqrt(2.0) * noise)
     drops = _beginnings(change < -threshold)
-    # A slow climb grows by up to a third of a drop in the same time, so half of one is sudden.
+    # A slow climb grows by up to a third of a drop in the same time, so half a drop is sudden.
     depth = -float(np.median(np.fmin.reduceat(change, drops))) if len(drops) else 0.0
     climbs = _beginnings(change > max(threshold, 0.5 * depth))
     if len(drops) < limits.slips_fewest or len(climbs) > limits.slips_upwards * len(drops):
@@ -271,9 +271,9 @@ def _beginnings(mask: Mask) -> NDArray[np.intp]:
 
 
 def power_of_normal_force(normal: Array, ratio: Array, rate: float, settings: AnalysisSettings) -> float:
-    """Return by what power T/N (n,) [-] may follow N (n,) [N]: the steepest fall to `law_steepest` readings allow.
+    """Return the most negative power of N (n,) [N] in T/N (n,) [-] that readings allow, down to `law_steepest`.
 
-    Means over blocks are fitted, and two standard errors are allowed. Never above 0.
+    Block means are fitted, with two standard errors of tolerance. Never above 0.
     """
     steepest = settings.ratio.law_steepest
     valid = np.isfinite(ratio) & (ratio > 0.0) & (normal > 0.0)

@@ -1,8 +1,8 @@
-"""A stroke, the touching movement inside a trial: its numbers, its flaws, and the friction that the model gets of it.
+"""A stroke, the touching movement inside a trial: its numbers, its flaws, and its friction for the model.
 
-Hertz: of a smooth elastic sphere on a plane the area grows as N^(2/3) (Johnson 1985, Contact Mechanics, section 4.2).
-A finger is neither; the exponent and the force at which the area is the planned one are assumed unless somebody gives
-them. No area is measured here.
+Hertz: the contact area of a smooth elastic sphere on a plane grows as N^(2/3) (Johnson 1985, Contact Mechanics, section
+4.2). A finger is neither; the exponent and the force at which the area is the planned one are assumed unless stated. No
+area is measured here.
 """
 
 import math
@@ -18,7 +18,7 @@ Interval = tuple[float, float]
 
 
 def digits(value: float, places: int, sign: Literal["", "+"] = "") -> str:
-    """Return a number with so many decimals and a true minus sign; with "+" positive ones have a sign too.
+    """Return a number with `places` decimals and a true minus sign; with "+" positive ones have a sign too.
 
     >>> digits(-0.25, 2), digits(0.25, 1, "+")
     ('−0.25', '+0.2')
@@ -27,7 +27,7 @@ def digits(value: float, places: int, sign: Literal["", "+"] = "") -> str:
 
 
 def significant(value: float, figures: int) -> str:
-    """Return a number with so many significant figures, never in powers of ten.
+    """Return a number with `figures` significant figures, without an exponent.
 
     >>> significant(8.0331, 3), significant(1523.4, 3), significant(0.0, 3)
     ('8.03', '1523', '0')
@@ -38,7 +38,7 @@ def significant(value: float, figures: int) -> str:
 
 
 class Meaning(NamedTuple):
-    """What a number is, in the tables of an export."""
+    """Unit and meaning of a number, for the tables of an export."""
 
     unit: str  # "" for none
     text: str
@@ -46,7 +46,7 @@ class Meaning(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StrokeCurve:
-    """The course of a stroke with some time around it; n readings. nan where a value means nothing. Read-only."""
+    """The n readings of a stroke and some time around it, read-only; nan where a value is undefined."""
 
     time: Array  # (n,) [s, device time]
     normal: Array  # (n,) filtered normal force [N]
@@ -57,7 +57,7 @@ class StrokeCurve:
     position: Array  # (n, 2) centre of pressure [mm]
     speed: Array  # (n,) of the centre of pressure [mm/s]
     noise: tuple[float, float]  # standard deviations of each force sideways, and along the normal, unloaded [N]
-    quiet: float  # how long that was seen [s]
+    quiet: float  # duration of that unloaded stretch [s]
     crests: Array | None = None  # (n,) unfiltered tangential force [N], where the contact sticks and slips
     crest_noise: float = 0.0  # its standard deviation, unloaded [N]
     crest_gap: float = 0.0  # how far readings may miss its greatest value [N]
@@ -71,10 +71,10 @@ class StrokeCurve:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stroke:
-    """One stroke. None stands where the recording allows no honest number; `flaws` says why."""
+    """One stroke. A number is None where it is withheld; `reasons` gives the flaw."""
 
     trial: Annotated[int | None, Meaning("", "number of its trial")]  # None where the recording has no trials
-    # No onset where the recording begins in contact, no lift where it ends in contact, neither where no zero is known.
+    # No onset where the recording begins in contact, no lift where it ends in contact, neither without a zero.
     onset: Annotated[float | None, Meaning("s", "first contact, device clock")]
     lift: Annotated[float | None, Meaning("s", "end of contact, device clock")]
     steady: Annotated[Interval | None, Meaning("s", "steady window, device clock")]
@@ -92,10 +92,10 @@ class Stroke:
     ]
     speed: Annotated[float | None, Meaning("mm/s", "of the centre of pressure over the steady window")]
     speed_error: Annotated[float | None, Meaning("mm/s", "standard error of the speed")]
-    mu_static: Annotated[float | None, Meaning("", "height of the static peak of T/N")]  # None where none stands out
+    mu_static: Annotated[float | None, Meaning("", "height of the static peak of T/N")]  # None without a clear peak
     mu_dynamic: Annotated[float | None, Meaning("", "mean of T/N over the steady window")]
     mu_dynamic_sd: Annotated[float | None, Meaning("", "standard deviation of T/N over the steady window")]
-    # The bootstrap's: see `BootstrapSettings.kind`.
+    # From the bootstrap: see `BootstrapSettings.kind`.
     mu_dynamic_interval: Annotated[Interval | None, Meaning("", "confidence interval of mu_dynamic")]
     mu_max: Annotated[float | None, Meaning("", "greatest T/N")]  # smoothed as the settings say
     tau_max: Annotated[float | None, Meaning("MPa", "greatest tangential force over the contact area")]
@@ -125,16 +125,16 @@ class Stroke:
 
 
 def meanings(record: type) -> dict[str, Meaning]:
-    """Return unit and meaning of each field of a record that has one, by its name, for those who read its tables."""
+    """Return unit and meaning, by name, of each field of a record that has them."""
     hints = get_type_hints(record, include_extras=True)
     return {name: hint.__metadata__[0] for name, hint in hints.items() if get_origin(hint) is Annotated}
 
 
-Grade = Literal["note", "doubtful", "refused"]  # numbers stand; numbers stand but doubt them; numbers were withheld
+Grade = Literal["note", "doubtful", "refused"]  # numbers hold; numbers are doubtful; numbers were withheld
 
 
 class FlawName(StrEnum):
-    """Every flaw there is."""
+    """Names of all flaws."""
 
     LOST_READINGS = "lost_readings"
     SATURATED = "saturated"
@@ -144,11 +144,11 @@ class FlawName(StrEnum):
     WILD = "wild_reading"
     IRREGULAR_TIME = "irregular_time"
     UNKNOWN_RATE = "unknown_rate"
-    RECORDING = "recording"  # what the recording itself says it lost
+    RECORDING = "recording"  # losses that the recording reports
     NO_UNLOADED_STRETCH = "no_unloaded_stretch"
     ZERO_AFTER_CONTACT = "zero_after_contact"
     DRIFT = "drift"
-    TILT_ASSUMED = "tilt_assumed"  # no press measures how the face leans
+    TILT_ASSUMED = "tilt_assumed"  # too few presses measure the tilt
     NORMAL_IMPLAUSIBLE = "normal_axis_implausible"
     UNITS_IMPLAUSIBLE = "units_implausible"
     NO_STROKE = "no_stroke"
@@ -172,18 +172,18 @@ class FlawName(StrEnum):
     DIRECTION_TURNS = "direction_turns"
     DIRECTION_DISAGREES = "direction_disagrees"
     WRONG_DIRECTION = "wrong_direction"
-    DECISION = "decision"  # what a person decided cannot be done, or cannot be read
+    DECISION = "decision"  # a decision that cannot be applied or read
 
 
 @dataclass(frozen=True, slots=True)
 class Flaw:
-    """One named defect, where it lies and what it costs."""
+    """One named defect, its place and its consequence."""
 
     name: FlawName
-    sentence: str  # what was found, and what it does to the numbers
+    sentence: str  # the finding, and its effect on the numbers
     grade: Grade
     trial: int | None = None  # None: the whole recording, or a recording without trials
-    stroke: int | None = None  # position in `Analysis.strokes`; None: not one stroke's
+    stroke: int | None = None  # position in `Analysis.strokes`; None: not of one stroke
 
 
 COEFFICIENTS = ("mu_static", "mu_dynamic", "mu_dynamic_sd", "mu_dynamic_interval", "mu_max", "tau_max", "contact_area")
@@ -196,26 +196,26 @@ EVERYTHING = (*COEFFICIENTS, *_LOADS, *SPEED, *DIRECTION, "steady", "readings", 
 
 @dataclass
 class Findings:
-    """Numbers and flaws of one stroke while they are gathered."""
+    """Numbers and flaws of one stroke during its analysis."""
 
     numbers: dict[str, Any] = field(default_factory=dict[str, Any])
     flaws: list[Flaw] = field(default_factory=list[Flaw])
     reasons: dict[str, str] = field(default_factory=dict[str, str])
 
     def flaw(self, name: FlawName, sentence: str, grade: Grade, withheld: tuple[str, ...] = ()) -> None:
-        """Name a flaw, and the numbers it forbids; the first to forbid a number is its reason."""
+        """Add a flaw and the numbers it withholds; the first flaw to withhold a number is its reason."""
         self.flaws.append(Flaw(name, sentence, grade))
         for number in withheld:
             self.reasons.setdefault(number, str(name))
 
 
 HERTZ_EXPONENT = 2.0 / 3.0
-PLANNED_AT = 2.0  # normal force at which an area that grows is the planned one, unless another is set [N]
+PLANNED_AT = 2.0  # normal force at which a growing area equals the planned one, unless set [N]
 
 
 @dataclass(frozen=True, slots=True)
 class AreaLaw:
-    """Contact area = planned area x (N / force)^exponent; `exponent` 0 is a fixed area."""
+    """Contact area = planned area x (N / force)^exponent; `exponent` is 0 for a fixed area."""
 
     law: Literal["fixed", "hertz", "power"] = "fixed"
     exponent: float = 0.0
@@ -232,7 +232,7 @@ class AreaLaw:
 
     @property
     def sentence(self) -> str:
-        """The law, for people, with what was assumed."""
+        """The law, for people, with its assumptions."""
         if self.law == "fixed":
             return "fixed, whatever the normal force"
         origin = "assumed" if self.force == PLANNED_AT else "set"
@@ -249,12 +249,12 @@ Rule = Literal["maximum", "mean over steady window"]
 
 @dataclass(frozen=True, slots=True)
 class FrictionParameters:
-    """What the model gets of one stroke. None where honesty allows no number."""
+    """Friction of one stroke for the model. None for withheld numbers."""
 
     trial: Annotated[int | None, Meaning("", "number of the trial")]
     stroke: Annotated[int, Meaning("", "position of the stroke, from 0")]
     mu: Annotated[float | None, Meaning("", "coefficient of friction the model is given")]
-    mu_interval: tuple[float, float] | None  # the bootstrap's, of that very number; None before it is drawn
+    mu_interval: tuple[float, float] | None  # of mu, from the bootstrap; None before it is drawn
     tau_max: Annotated[float | None, Meaning("MPa", "traction bound the model is given")]
     contact_area: Annotated[float, Meaning("mm2", "for which tau_max was computed")]
     speed: Annotated[float | None, Meaning("mm/s", "of the stroke")]
@@ -266,8 +266,8 @@ class FrictionParameters:
 def rule_for(trial: Trial | None) -> Rule:
     """Return the paper's choice (section 3): the maximum for stickiness, the mean over the steady range elsewhere.
 
-    A protocol with other descriptors is judged by direction: pushed forward the skin is blocked first, as in the
-    paper's stickiness, and the maximum is about the dynamic value. A recording without a plan gets the mean.
+    For other descriptors the direction decides: pushed forward the skin is blocked first, as in the paper's stickiness,
+    and the maximum is close to the dynamic value. A recording without a plan gets the mean.
     """
     if trial is None or trial.stimulus.descriptor == "slipperiness":
         return "mean over steady window"
@@ -277,7 +277,7 @@ def rule_for(trial: Trial | None) -> Rule:
 
 
 def friction_parameters(stroke: Stroke, position: int, trial: Trial | None, contact_area: float) -> FrictionParameters:
-    """Return what the model gets of the stroke at a position of `Analysis.strokes`."""
+    """Return the friction, for the model, of the stroke at `position` of `Analysis.strokes`."""
     rule = rule_for(trial)
     return FrictionParameters(
         trial=stroke.trial,

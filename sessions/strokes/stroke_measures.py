@@ -1,4 +1,4 @@
-"""The numbers of one stroke, and what forbids some of them."""
+"""The numbers of one stroke, and the flaws that withhold them."""
 
 import numpy as np
 
@@ -34,7 +34,7 @@ from sessions.strokes.stroke import (
 
 _SLIDES_BEFORE = "the contact slides before T/N stops climbing"
 _NO_PEAK = "no static peak stands out"
-_STICK_WITHOUT = (_NO_PEAK, FlawName.NO_STEADY_SLIDING, FlawName.RATIO_ABOVE_ONE)  # a stick phase needs none of these
+_STICK_WITHOUT = (_NO_PEAK, FlawName.NO_STEADY_SLIDING, FlawName.RATIO_ABOVE_ONE)  # a decided stick phase lifts these
 
 
 def measure_stroke(
@@ -46,9 +46,9 @@ def measure_stroke(
     number: int,
     decisions: StrokeDecisions,
 ) -> tuple[Stroke, tuple[Flaw, ...]]:
-    """Return a contact's stroke and its flaws; `plan` gives the face's frame and the area for tau_max.
+    """Return a contact's stroke and its flaws; `plan` gives the contact area for tau_max.
 
-    `number` is that of the stroke within its trial; a person's `decisions` about it go before what is found.
+    `number` counts strokes within the trial; a person's `decisions` override the analysis.
     """
     findings, crest_gap = Findings(), None
     track = track_of(span, contact, zero)
@@ -156,7 +156,7 @@ def _judge_gaps(findings: Findings, span: Span, contact: Contact) -> None:
 
 
 def _judge_loads(findings: Findings, track: Track, planned_area: float) -> None:
-    """Give the greatest forces, and say where they are implausible."""
+    """Record the greatest forces, and flaws where they are implausible."""
     peak, settings = float(np.nanmax(track.normal, initial=0.0)), track.settings
     greatest = float(np.nanmax(track.tangential, initial=0.0))
     traction, area = _greatest_traction(track, track.tangential, planned_area)
@@ -184,7 +184,7 @@ def _judge_loads(findings: Findings, track: Track, planned_area: float) -> None:
 
 
 def _greatest_traction(track: Track, tangential: Array, planned_area: float) -> tuple[float | None, float | None]:
-    """Return the greatest mean traction [MPa] and the area [mm2] it acts on; None where an area that grows has no N."""
+    """Return the greatest mean traction [MPa] and the area [mm2] it acts on; None where a growing area has no N."""
     law = track.settings.area
     if law.law == "fixed":
         return float(np.nanmax(tangential, initial=0.0)) / planned_area, planned_area
@@ -198,7 +198,7 @@ def _greatest_traction(track: Track, tangential: Array, planned_area: float) -> 
 
 
 def _greatest_ratio(track: Track, floor: float) -> float | None:
-    """Return the greatest T/N of forces averaged over a moving window, wherever N stays above `floor` [N] in it.
+    """Return the greatest T/N of forces averaged over a moving window, where N stays above `floor` [N].
 
     Forces are averaged, not the ratio: noise then raises the maximum far less.
     """
@@ -215,7 +215,7 @@ def _greatest_ratio(track: Track, floor: float) -> float | None:
 
 
 def _friction(findings: Findings, track: Track, window: slice) -> None:
-    """Give the mean of T/N over the steady window, and of the forces."""
+    """Record the means of T/N and of the forces over the steady window."""
     values = track.ratio[window][np.isfinite(track.ratio[window])]
     mean = float(values.mean())
     if mean > 1.0:
@@ -236,7 +236,7 @@ def _friction(findings: Findings, track: Track, window: slice) -> None:
 def _stick_slip(
     findings: Findings, span: Span, contact: Contact, track: Track, window: slice, zero: StrokeZero, planned_area: float
 ) -> float | None:
-    """Tell tau_max by the unfiltered force where the contact sticks and slips; return how far it may be missed [N]."""
+    """In stick-slip, take tau_max from the unfiltered force, and return how far readings may miss it [N]."""
     drag, normal = unfiltered_forces(span, slice(contact.start, contact.stop), zero)
     ratio = np.where(normal >= track.floor, drag / np.maximum(normal, track.floor), np.nan)
     level, load = float(np.nanmean(track.ratio[window])), float(np.nanmean(track.normal[window]))
@@ -258,7 +258,7 @@ def _stick_slip(
 
 
 def _judge_drift(findings: Findings, zero: StrokeZero, limits: ZeroSettings) -> None:
-    """Say how far a zero that moves may have changed mu, and withhold the numbers where that is too much."""
+    """Record a flaw where drift of the zero may have changed mu, and withhold the numbers if by too much."""
     sideways, upright = zero.unsure
     tangential = findings.numbers.get("tangential_force", findings.numbers["peak_tangential"])
     normal = findings.numbers.get("normal_force", findings.numbers["peak_normal"])
@@ -275,7 +275,7 @@ def _judge_drift(findings: Findings, zero: StrokeZero, limits: ZeroSettings) -> 
 
 
 def _decide_slide_onset(findings: Findings, track: Track, decisions: StrokeDecisions) -> None:
-    """Set the slide onset that a person decided, unless it lies outside of the contact."""
+    """Set the slide onset that a person decided, unless it lies outside the contact."""
     onset = decisions.instant("slide_onset")
     if onset is not None and track.time[0] <= onset <= track.time[-1]:
         findings.numbers["slide_onset"] = onset
@@ -285,11 +285,11 @@ def _decide_slide_onset(findings: Findings, track: Track, decisions: StrokeDecis
 
 
 def _static_peak(findings: Findings, track: Track, window: slice, zero: StrokeZero, *, turns: bool) -> None:
-    """Give the static peak where one stands out of what follows it by its noise and by a share.
+    """Record the static peak where it exceeds the level after it by its noise and by a share.
 
-    What follows is both the level just after it and the highest crest of the steady window, for a contact that sticks
-    and slips peaks again and again. Both count as they would be under the peak's own normal force, as far as T/N may
-    follow that. The filter overshoots a sudden change, of twice the level where the finger `turned`, by 3.5 %.
+    The level is both the one just after the peak and the highest crest of the steady window, since stick-slip peaks
+    repeatedly. Both are scaled to the peak's normal force, as far as T/N may follow N. The filter overshoots a sudden
+    change, of twice the level where the finger `turns`, by 3.5 %.
     """
     settings, began = track.settings, findings.numbers.get("slide_onset", track.time[window.start])
     latest = int(np.searchsorted(track.time, float(began + settings.ratio.static_late)))
@@ -314,17 +314,17 @@ def _static_peak(findings: Findings, track: Track, window: slice, zero: StrokeZe
 
 
 def _break_away(findings: Findings, track: Track, window: slice) -> None:
-    """Give the end of the stick phase, unless the contact slides before it."""
+    """Record the end of the stick phase, unless the contact slides before it."""
     peaked = "mu_static" in findings.numbers
     instant = break_away(track.time[: window.stop], track.ratio[: window.stop], track.settings, peaked=peaked)
     findings.numbers["break_away"] = instant
-    tolerance = 0.5 / track.settings.filter.speed_cut_off  # half a period, by which its filter may move a slide's onset
+    tolerance = 0.5 / track.settings.filter.speed_cut_off  # half a period: the filter may shift a slide's onset by that
     if instant is not None and instant > findings.numbers.get("slide_onset", np.inf) + tolerance:
         findings.reasons["break_away"] = _SLIDES_BEFORE
 
 
 def _apply_decisions(findings: Findings, track: Track, decisions: StrokeDecisions) -> None:
-    """Set the stick phase and the direction that a person decided."""
+    """Set the stick phase and the direction decided by a person."""
     stick = decisions.value("stick")
     if stick is not None:
         inside = track.ratio[(track.time >= stick[0]) & (track.time <= stick[1])]
@@ -343,9 +343,9 @@ def _apply_decisions(findings: Findings, track: Track, decisions: StrokeDecision
 
 
 def _judge_direction(findings: Findings, track: Track, window: slice) -> None:
-    """Say where the tangential force turns: then there is no one direction, or this is not one stroke.
+    """Record a flaw where the tangential force turns: there is no single direction, or not a single stroke.
 
-    A finger at rest has almost no drag, and its noise points anywhere.
+    A finger at rest has almost no drag, and noise has any direction.
     """
     limits, greatest = track.settings.slide, np.nanmax(track.tangential, initial=0.0)
     in_drag = np.isfinite(track.ratio) & (track.tangential >= limits.drag_share * greatest)

@@ -1,8 +1,8 @@
-"""What the readings of one trial say: its strokes, and its presses, from which the tilt of the face is estimated.
+"""Analysis of one trial: its strokes, and its presses, from which the tilt of the face is estimated.
 
-Whoever presses along the face's normal n with the force N exerts -N n: what stands sideways over N is how far n leans.
-A press that pushes sideways by itself looks the same. Presses of one hand lean alike, so only several presses, or a
-weight in place of a finger, distinguish the face from the hand.
+A press along the face's normal n with the force N exerts -N n: the sideways force divided by N is the tilt of n. A
+press that also pushes sideways looks the same. Presses of one hand share that push, so only several presses, or a
+weight in place of a finger, distinguish face from hand.
 """
 
 from collections.abc import Iterable, Sequence
@@ -31,13 +31,13 @@ from sessions.strokes.span import Span, StrokeZero, recorded_zero, span_of, trac
 from sessions.strokes.stroke import Flaw, FlawName, Stroke, significant
 from sessions.strokes.stroke_measures import measure_stroke
 
-ZERO_SETTING = "zero"  # of `TransducerInfo.settings`: who says that the recording's own zero is true
+ZERO_SETTING = "zero"  # of `TransducerInfo.settings`: whether the recording's own zero is stated to be true
 ZERO_STATED = "as recorded, stated to be true"
 RAW_WRENCH = "N, N mm"  # raw unit of readings that came as a wrench
 
 
 class TrialContext(NamedTuple):
-    """What all trials of an analysis share."""
+    """Inputs shared by all trials of an analysis."""
 
     plan: SessionPlan
     info: TransducerInfo
@@ -52,33 +52,33 @@ class TrialContext(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Press:
-    """A contact that pressed and did not slide."""
+    """A contact that presses without sliding."""
 
     trial: int | None
     start: float  # of the hold [s, device clock]
     stop: float
-    lean: Pair  # of the face's normal towards +x and +y [degrees], if it pressed straight down
+    lean: Pair  # of the face's normal towards +x and +y [degrees], if the press was straight
     error: Pair  # standard uncertainty from noise and zero [degrees]
 
 
 @dataclass(frozen=True, slots=True)
 class Tilt:
-    """How far the face's normal leans from the transducer's axis towards +x and +y."""
+    """Tilt of the face's normal from the transducer's axis towards +x and +y."""
 
     lean: Pair  # [degrees]
     x_interval: Pair  # [degrees]
     y_interval: Pair
     presses: tuple[Press, ...]
-    kind: str  # what the intervals hold, for people
+    kind: str  # description of the intervals, for people
 
     @property
     def error(self) -> Pair:
-        """The standard uncertainty [degrees] of the mean of two presses or more, from how they scatter."""
+        """Standard uncertainty [degrees] of the mean of at least two presses, from their scatter."""
         return _mean_error(self.presses)
 
 
 class TrialAnalysis(NamedTuple):
-    """What one trial's readings say; `stroke` of a flaw counts within the trial."""
+    """Results of one trial; `stroke` of a flaw counts within the trial."""
 
     strokes: tuple[Stroke, ...] = ()
     flaws: tuple[Flaw, ...] = ()
@@ -116,7 +116,7 @@ def analyse_trial(trial: Trial | None, block: ReadingBlock, context: TrialContex
 
 
 def _common_zero(span: Span, context: TrialContext) -> StrokeZero | None:
-    """Return the zero by which contacts are found; None where it is not known."""
+    """Return the zero for detecting contacts; None where it is unknown."""
     if context.zero_is_stated:
         return recorded_zero(span, is_stated=True)
     first = span.windows.zero_after(-np.inf, context.settings.zero.zero_stretch)
@@ -126,7 +126,7 @@ def _common_zero(span: Span, context: TrialContext) -> StrokeZero | None:
 
 
 def _pull(span: Span, zero: StrokeZero) -> Flaw | None:
-    """Return the flaw of a normal axis along which the recording pulls rather than presses."""
+    """Return the flaw of a normal axis along which the forces pull rather than press."""
     axis, settings = span.frame.normal, span.settings
     low, high = np.percentile(zero.level[2] - span.wrench[:, 2], [0.5, 99.5])
     if -low <= max(settings.contact.pull_share * high, onset_threshold(float(zero.noise[2]), settings.detector)):
@@ -139,7 +139,7 @@ def _pull(span: Span, zero: StrokeZero) -> Flaw | None:
 
 
 def _pieces(span: Span, zero: StrokeZero, context: TrialContext) -> tuple[list[Contact], Mask, list[Flaw]]:
-    """Return the contacts worth measuring, cut into strokes; readings (n,) in which nothing touches; and flaws."""
+    """Return the contacts to measure, cut into strokes; the mask of unloaded readings (n,); and flaws."""
     settings = context.settings
     normal, smooth = zero.level[2] - span.wrench[:, 2], zero.level[2] - span.smooth[:, 2]
     noise = float(zero.noise[2])
@@ -192,7 +192,7 @@ def _worth_measuring(pieces: list[Contact], span: Span, smooth: Array) -> tuple[
 def _measure(
     pieces: list[Contact], idle: Mask, span: Span, zero: StrokeZero, trial: Trial | None, context: TrialContext
 ) -> TrialAnalysis:
-    """Measure contacts as they were found or decided, each from its own zero unless one was stated."""
+    """Measure contacts, as detected or decided, each with its own zero unless one was stated."""
     number = None if trial is None else trial.number
     by_stroke = [context.decisions.of_stroke(number, index) for index in range(1, len(pieces) + 1)]
     flaws: list[Flaw] = []
@@ -215,7 +215,7 @@ def _measure(
 
 
 def _with_decided_ends(piece: Contact, decisions: StrokeDecisions, span: Span) -> tuple[Contact, Flaw | None]:
-    """Return a contact with the onset and lift that were decided; as it is, with a flaw, where none can be."""
+    """Return a contact with the decided onset and lift; unchanged, with a flaw, where they are not possible."""
     onset, lift = decisions.instant("onset"), decisions.instant("lift")
     start = piece.start if onset is None else int(np.searchsorted(span.time, onset))
     stop = piece.stop if lift is None else int(np.searchsorted(span.time, lift))
@@ -230,7 +230,7 @@ def _with_decided_ends(piece: Contact, decisions: StrokeDecisions, span: Span) -
 
 
 def _stroke_count(strokes: tuple[Stroke, ...], trial: Trial | None, context: TrialContext) -> Iterable[Flaw]:
-    """Yield a flaw where there is no stroke, or more than the trial asks for."""
+    """Yield a flaw without a stroke, or more than the trial asks for."""
     if not strokes:
         yield Flaw(FlawName.NO_STROKE, "No contact is a stroke.", "refused")
     if trial is None or len(strokes) <= (limit := context.plan.stroke_limit(trial)):
@@ -245,7 +245,7 @@ def _stroke_count(strokes: tuple[Stroke, ...], trial: Trial | None, context: Tri
 
 
 def strokes_for_model(strokes: tuple[Stroke, ...], trial: Trial | None, decisions: Decisions) -> tuple[Stroke, ...]:
-    """Return the strokes of a part that the model gets: of a trial the one decided, or else the first that is kept."""
+    """Return the strokes for the model: in a trial the decided one, else the first that is kept."""
     strokes = tuple(stroke for stroke in strokes if stroke.kept)
     if trial is None:
         return strokes
@@ -254,7 +254,7 @@ def strokes_for_model(strokes: tuple[Stroke, ...], trial: Trial | None, decision
 
 
 def press_of(span: Span, contact: Contact, zero: StrokeZero, trial: int | None) -> Press | None:
-    """Return the press in a contact; None where it slides, is short, or drags more than a press does."""
+    """Return the press in a contact; None where it slides, is too short, or has too much drag."""
     track, limits, settings = track_of(span, contact, zero), span.settings.press, span.settings
     peak = float(np.nanmax(track.normal, initial=0.0))
     if peak < settings.ratio.force_floor:
@@ -272,13 +272,13 @@ def press_of(span: Span, contact: Contact, zero: StrokeZero, trial: int | None) 
         return None
     scatter = ratio.std(axis=0, ddof=1) / np.sqrt(len(ratio))
     error_x, error_y = np.degrees(np.hypot(scatter, zero.error[:2] / float(blocks[:, 2].mean()))).tolist()
-    # What was levelled before counts too: the lean is that against the transducer.
+    # The tilt already corrected is added: the lean is relative to the transducer.
     x, y = (np.degrees(np.arctan(ratio.mean(axis=0))) + settings.tilt).tolist()
     return Press(trial, start, stop, (x, y), (error_x, error_y))
 
 
 def tilt_of(presses: Sequence[Press], settings: AnalysisSettings) -> Tilt | None:
-    """Return the tilt that presses measure, with intervals; None without any."""
+    """Return the tilt measured by presses, with intervals; None without presses."""
     if not presses:
         return None
     from scipy.special import stdtrit  # slow to load, and neither window nor recorder has need of it

@@ -1,1 +1,1 @@
-"""The protocols we run, a validated TOML file each, their reader, and the plan of a session. The folder is the list."""
+"""The built-in protocols (the TOML files of this folder), their reader, and the plan of a session."""

@@ -1,4 +1,4 @@
-"""The plan of one session, made from its protocol: who, which stimuli under which labels, in which order."""
+"""The plan of one session, made from its protocol: subject, stimuli, labels and order."""
 
 import re
 from collections import Counter
@@ -27,7 +27,7 @@ DIRECTIONS = {"proximal to distal": PROXIMAL_TO_DISTAL, "distal to proximal": DI
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """What is a subject's own; None where the protocol's or the model's holds."""
+    """Values of one subject; None where the protocol's or the model's value is used."""
 
     finger: Finger = field(default_factory=Finger)
     contact_angle: float | None = None  # between the finger's axis and the face [degrees]
@@ -48,7 +48,7 @@ class StudyPlace:
 
 @dataclass(frozen=True, slots=True)
 class VisitSetting:
-    """How one visit is held; frame and area of the face, where given, replace the protocol's."""
+    """Settings of one visit; frame and area of the face, where given, replace the protocol's."""
 
     frame: Frame | None = None
     contact_area: float | None = None  # [mm2]
@@ -115,7 +115,7 @@ def plan(
 
 
 def _order_rule(protocol: Protocol, row: int | None, first_block: BlockOutline) -> str:
-    """Return in words how the order of a session came about: the row of its design, its first block."""
+    """Return the origin of a session's order in words: rule, row of the design, first block."""
     rule = protocol.order.rule if row is None else f"{protocol.order.rule}, row {row} of {design_rows(protocol)}"
     counterbalanced = protocol.order.blocks == "counterbalanced"
     return f"{rule}; blocks counterbalanced, {first_block.name} first" if counterbalanced else rule
@@ -125,30 +125,30 @@ CODE_RULE = "a code of letters, digits, - and _ (at most 32), never a name"
 
 
 def is_code(text: str) -> bool:
-    """Say whether a text is a code: no name, nothing a file's name could not hold."""
+    """Say whether a text is a code as `CODE_RULE` demands, safe in a file name."""
     return re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", text) is not None
 
 
 def design_rows(protocol: Protocol) -> int | None:
-    """Return how many rows the protocol's design has; None where every order is drawn for itself."""
+    """Return the number of rows of the protocol's design; None where each order is drawn independently."""
     if protocol.order.rule != "williams":
         return None
     return max(len(williams(len(block.indices))) for block in protocol.blocks)
 
 
 def block_order(protocol: Protocol, number: int) -> tuple[BlockOutline, ...]:
-    """Return the blocks as a subject meets them; counterbalanced ones begin one later with each `number`, from 0."""
+    """Return the blocks in a subject's order; counterbalanced, it begins `number` blocks (from 0) later."""
     start = number % len(protocol.blocks) if protocol.order.blocks == "counterbalanced" else 0
     return protocol.blocks[start:] + protocol.blocks[:start]
 
 
 def blind(plan: SessionPlan) -> SessionPlan:
-    """Return the plan with codes alone: which stimulus bears which is hidden."""
+    """Return the plan with codes alone, without the indices of the stimuli."""
     return plan.with_trials(lambda trial: replace(trial, stimulus=replace(trial.stimulus, index=None)))
 
 
 def check_body(body: Body, protocol: Protocol) -> None:
-    """Raise NotAllowed where a subject's own value is out of range."""
+    """Raise NotAllowed where one of a subject's values is out of range."""
     check_range("contact_angle", body.contact_angle, 10, 90, "degrees")
     check_range("tip_radius", body.finger.tip_radius, 3, 15, "mm")
     check_range("width", body.finger.width, 5, 40, "mm")
@@ -160,10 +160,10 @@ def check_body(body: Body, protocol: Protocol) -> None:
 
 @dataclass(eq=False)
 class _Blocks:
-    """Makes the blocks of a plan one after the other, trials numbered on."""
+    """Makes the blocks of a plan in turn, with trials numbered across them."""
 
     protocol: Protocol
-    outlines: Sequence[BlockOutline]  # in the order they are met in
+    outlines: Sequence[BlockOutline]  # in the subject's order
     seed: int
     row: int | None
     design_seed: int
@@ -208,7 +208,7 @@ class _Blocks:
         return orders
 
     def _candidates(self, outline: BlockOutline) -> tuple[Stimulus, ...]:
-        """Return what is compared with the standard of an adaptive block, by index; nothing in any other block."""
+        """Return the stimuli compared with the standard of an adaptive block, by index; none in other blocks."""
         comparisons = sorted(set(outline.indices) - {outline.standard}) if outline.adaptive is not None else ()
         return tuple(self._stimulus(outline, index) for index in comparisons)
 
@@ -218,7 +218,7 @@ class _Blocks:
     def _pairs(
         self, outline: BlockOutline, codes: Sequence[str], repetition: int, name: str
     ) -> tuple[tuple[str, str], ...]:
-        """Return the pairs of one repetition: every two, or each with the standard where there is one."""
+        """Return the pairs of one repetition: every two stimuli, or each with the standard, if any."""
         if outline.standard is None:
             return pairs(codes, self.seed, name)
         standard = self.labels[outline.descriptor, outline.standard]
@@ -239,7 +239,7 @@ class _Blocks:
         return tuple(by_code[code] for code in order)
 
     def _row_of_design(self, outline: BlockOutline, row: int) -> tuple[int, ...]:
-        """Return a row of the Williams design, whose letters chance deals to the codes for the whole study."""
+        """Return a row of the Williams design, whose letters are assigned to codes at random, once for the study."""
         by_code = self._by_code(outline)
         letters = shuffle(tuple(by_code), self.design_seed, f"{outline.name}/letters")
         rows = williams(len(letters))

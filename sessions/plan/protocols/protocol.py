@@ -26,18 +26,18 @@ from sessions.toml_file import (
 
 FOLDER = Path(__file__).parent
 LARGEST_SEED = 2**31 - 1  # a whole number that every language can hold
-LEAST_COMPARISONS = 3  # with a standard: two fit any point of subjective equality and any just noticeable difference
+LEAST_COMPARISONS = 3  # with a standard: two do not determine PSE and just noticeable difference
 Labels = dict[tuple[str, int], str]  # descriptor and index of a stimulus -> the code on its back
 PRE_EVALUATION = "pre-evaluation"  # the name under which the instruction of that phase is translated
 ENGLISH = "en"
-# In the smallest type a screen of 960 by 540 points holds 1,500 letters of any script, and not 2,000 of Japanese.
+# In the smallest type a screen of 960 by 540 points holds 1,500 letters of any script, but not 2,000 of Japanese.
 LONGEST_TEXT = 1500  # that the subject reads
 DEEPEST_INDENTATION = 10  # press of the model's finger [mm]
 INDENTATIONS = f"above 0, up to {DEEPEST_INDENTATION} mm"
 
 
 def check_depth(key: str, depth: float) -> None:
-    """Raise NotAllowed for a depth that the model does not press the finger to [mm]."""
+    """Raise NotAllowed for a depth [mm] that the model does not accept."""
     check(0 < depth <= DEEPEST_INDENTATION, key, depth, f"it must lie {INDENTATIONS}")
 
 
@@ -56,8 +56,8 @@ class BlockOutline(msgspec.Struct, frozen=True):
     repetitions: int = 1  # of each stimulus, or of each pair
     practice: tuple[int, ...] = ()  # stimuli of the practice trials, in their order
     simulated_friction: tuple[float, ...] = msgspec.field(default=(), name="planted_friction")  # µ of `indices` [-]
-    standard: int | None = None  # of `indices`: every pair is of it and another; None: every two are compared
-    adaptive: int | None = None  # comparisons with the standard, each chosen by the answers before it; None: planned
+    standard: int | None = None  # one of `indices`, in every pair; None: every two stimuli are compared
+    adaptive: int | None = None  # comparisons with the standard, each chosen from earlier answers; None: planned
 
     def __post_init__(self) -> None:
         """Check ranges."""
@@ -98,7 +98,7 @@ class BlockOutline(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Translation:
-    """The texts of one block in one language; it has those that the block has."""
+    """The texts of one block in one language, the same texts as in the block."""
 
     language: str  # two or three small letters, as ISO 639 has them
     block: str  # its name, or "pre-evaluation" for the instruction of that phase
@@ -125,7 +125,7 @@ AREAS = (1, 2000)  # of a contact [mm2]
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """Where the stimulus's face lies, and the area the finger touches it with; None where nobody stated it."""
+    """Position of the stimulus's face, and the contact area; None where nobody stated it."""
 
     normal: Literal["+x", "-x", "+y", "-y", "+z", "-z"] | None = None
     height: float | None = None  # above the transducer's origin [mm]
@@ -148,18 +148,18 @@ class OrderRules:
     """How stimulus orders are made."""
 
     rule: Literal["shuffled", "williams"] = "shuffled"
-    blocks: Literal["as listed", "counterbalanced"] = "as listed"  # counterbalanced: each subject begins one later
+    blocks: Literal["as listed", "counterbalanced"] = "as listed"  # counterbalanced: each subject starts a block later
     neighbours_apart: bool = False  # no two neighbours of the scale in a row
     not_first: tuple[int, ...] = ()  # indices that begin no block
     first_differs: bool = False  # repetitions of a block begin with different stimuli
 
     @property
     def constrained(self) -> bool:
-        """Say whether not every order will do."""
+        """Say whether any rule excludes an order."""
         return self.neighbours_apart or bool(self.not_first) or self.first_differs
 
     def meets(self, order: Sequence[int], begun_with: Sequence[int] = ()) -> bool:
-        """Say whether an order of indices will do, where repetitions before it began with `begun_with`."""
+        """Say whether an order of indices meets the rules, after repetitions that began with `begun_with`."""
         rank = {index: position for position, index in enumerate(sorted(order))}
         return (
             not (self.neighbours_apart and any(abs(rank[a] - rank[b]) == 1 for a, b in pairwise(order)))
@@ -173,7 +173,7 @@ class Scale:
     """How the subject answers."""
 
     answer: Literal["line", "number", "choice"] = "line"
-    ticks: int = 0  # marks on the line between its ends; answers gather at marks, so there are none unless asked for
+    ticks: int = 0  # marks on the line between its ends; answers gather at marks, so the default is none
 
     def __post_init__(self) -> None:
         """Check ranges."""
@@ -188,7 +188,7 @@ class PreEvaluation:
     instruction: str
 
     def __post_init__(self) -> None:
-        """Check that there is one."""
+        """Check that the instruction is not blank."""
         check_text("instruction", self.instruction)
 
 
@@ -201,7 +201,7 @@ class Protocol:
     label_seed: int  # decides the opaque labels: the same stimulus bears the same label throughout a study
     contact_angle: float  # between the finger's axis and the surface [degrees]
     blocks: tuple[BlockOutline, ...]
-    phases: tuple[Phase, ...] = ("main",)  # of a visit that asks for no others
+    phases: tuple[Phase, ...] = ("main",)  # of a visit that names none
     masking: str = ""  # of sounds, such as "pink noise in headphones"; empty: none
     order: OrderRules = field(default_factory=OrderRules)
     scale: Scale = field(default_factory=Scale)
@@ -210,10 +210,10 @@ class Protocol:
     pre_evaluation: PreEvaluation | None = None
     face: Face = field(default_factory=Face)
     language: str = ENGLISH  # of the texts above
-    translations: tuple[Translation, ...] = ()  # of them, a table for each block and language
+    translations: tuple[Translation, ...] = ()  # of these texts, one table for each block and language
 
     def __post_init__(self) -> None:
-        """Check ranges, that blocks and stimuli are distinct, and that answers and orders can be had."""
+        """Check ranges, that blocks and stimuli are distinct, and that answers and orders are possible."""
         is_code = re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.name) is not None
         check(is_code, "name", self.name, "it must be of small letters, digits and single hyphens")
         check_range("label_seed", self.label_seed, 0, LARGEST_SEED)
@@ -242,7 +242,7 @@ class Protocol:
         return tuple(
             (block.descriptor, index, mu)
             for block in self.blocks
-            for index, mu in zip(block.indices, block.simulated_friction, strict=False)  # or none has any
+            for index, mu in zip(block.indices, block.simulated_friction, strict=False)  # none, or one for each index
         )
 
     @property
@@ -278,7 +278,7 @@ class Protocol:
         return replace(self, blocks=blocks, pre_evaluation=pre_evaluation, language=language, translations=())
 
     def _check_answers(self, key: str, block: BlockOutline) -> None:
-        """Check that a block says what its answers need, and nothing that they do not have."""
+        """Check that a block has every key that its kind of answer needs, and no others."""
         answer, ends, question = self.scale.answer, block.scale_ends, block.question
         if answer == "line":
             check(ends is not None, f"{key}.scale_ends", None, "both ends of the line must be named")
@@ -293,7 +293,7 @@ class Protocol:
             raise NotAllowed(f"{key}.standard", block.standard, "only a choice of two compares with a standard")
 
     def _check_translations(self) -> None:
-        """Check that each language has every text of the protocol once, and none that it has not."""
+        """Check that each language has every text of the protocol once, and no others."""
         scale_ends = {block.name: block.scale_ends for block in self.blocks}
         names = [*scale_ends, *([PRE_EVALUATION] if self.pre_evaluation is not None else [])]
         translated: set[tuple[str, str]] = set()
@@ -365,11 +365,11 @@ def protocol(name_or_path: str | Path) -> Protocol:
     return new_protocol(text_of(path), str(path))
 
 
-@lru_cache  # the window asks for it with each key that is typed
+@lru_cache  # the window calls this at each key press
 def new_protocol(text: str, where: str) -> Protocol:
     """Return the protocol that a TOML text describes, if a subject's screen holds its texts. Raises SettingsError.
 
-    One that a study holds already is read without this check.
+    The protocol of an existing study is read without this check.
     """
     description = from_toml(text, Protocol, where)
     for key, words in description.texts():
