@@ -326,8 +326,7 @@ def _open_recording(folder: Path) -> Recording:
 
 def _options(recording: Recording) -> PredictionOptions:
     """Return the options of the kept prediction, or the usual ones; what nobody looks at here is not solved for."""
-    options = stored_options(recording) or PredictionOptions()
-    return replace(options, intervals=False, variants="none", variant_intervals=False)
+    return replace(stored_options(recording), intervals=False, variants="none", variant_intervals=False)
 
 
 def sentence_of(error: Exception) -> str:

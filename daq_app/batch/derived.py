@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from daq_app.console import Console, WrongValue
 from sessions.file_access import as_type
@@ -40,6 +40,11 @@ from sessions.toml_file import SettingsError, from_table
 ANALYSIS = "analysis.json"
 PREDICTION = "prediction.json"
 _VERBS = {ANALYSIS: "analyse", PREDICTION: "predict"}  # that make them
+_SETTINGS = {  # what somebody may have set in them
+    ANALYSIS: "law of the contact area and seed of the intervals",
+    PREDICTION: "options and afferent of the prediction",
+}
+_RANK = ("none", "small", "both").index  # of variants
 
 
 def analyse_session(
@@ -56,7 +61,7 @@ def analyse_session(
     says, area and seed are as in the analysis that was kept before, and the gain's error as it was last set: what
     somebody set is not lost by a verb that says nothing of it. Raises RecordingError where the last is damaged.
     """
-    previous = _read_or_empty(recording, ANALYSIS)
+    previous = _read_or_empty(recording, ANALYSIS, console)
     if gain_error is None:
         gain_error = gain_error_set(recording.folder)
     else:
@@ -89,10 +94,11 @@ def outdated_prediction(recording: Recording, now: AnalysisSettings) -> str | No
     return f"{PREDICTION} was made with {' and '.join(reasons)}: 'daq-app predict' makes it anew"
 
 
-def stored_options(recording: Recording) -> PredictionOptions | None:
-    """Return the options of the prediction that was kept before; None where there is none that can be read."""
+def stored_options(recording: Recording, variants: Literal["none", "small", "both"] = "none") -> PredictionOptions:
+    """Return the options of the prediction kept before, or the usual ones, with at least these `variants`."""
     previous = _read_or_empty(recording, PREDICTION)
-    return from_table(previous["options"], PredictionOptions, PREDICTION) if "options" in previous else None
+    options = from_table(previous.get("options", {}), PredictionOptions, PREDICTION)
+    return replace(options, variants=max(options.variants, variants, key=_RANK))
 
 
 def stored_afferent(recording: Recording) -> AfferentSettings | None:
@@ -129,11 +135,16 @@ def stored_document(folder: Path, name: str) -> dict[str, Any] | None:
     return document
 
 
-def _read_or_empty(recording: Recording, name: str) -> Mapping[str, Any]:
-    """Return a stored document; empty where there is none, or a damaged one, which is then made again."""
+def _read_or_empty(recording: Recording, name: str, console: Console | None = None) -> Mapping[str, Any]:
+    """Return a stored document; empty where there is none, or a damaged one.
+
+    Who makes it anew gives a `console`, which names the loss of what somebody set in a damaged one.
+    """
     try:
         return stored_document(recording.folder, name) or {}
-    except RecordingError:
+    except RecordingError as damaged:
+        if console is not None:
+            console.lose(f"{damaged}; the {_SETTINGS[name]} are the usual ones now")
         return {}
 
 
@@ -150,7 +161,7 @@ def predict_session(
     What else was kept before and is not asked for again is named. Raises as `predict` does.
     """
     prediction = _predict(analysis, recording.plan, options, console.reporter("predicting"))
-    previous = _read_or_empty(recording, PREDICTION)
+    previous = _read_or_empty(recording, PREDICTION, console)
     document = _with_firing(prediction, afferent or _afferent_of(previous))
     lost = _dropped_parts(previous, prediction.options)
     if _keep(console, store_derived, recording.folder, PREDICTION, document) and lost:
@@ -166,9 +177,8 @@ def _with_firing(prediction: SessionPrediction, afferent: AfferentSettings | Non
 def _dropped_parts(previous: Mapping[str, Any], now: PredictionOptions) -> list[str]:
     """Name what a stored prediction was asked for and another is not, with the words that ask for it."""
     options = from_table(previous.get("options", {}), PredictionOptions, PREDICTION)
-    rank = ("none", "small", "both").index
     lost = ["intervals of the SED (--intervals)"] if options.intervals and not now.intervals else []
-    if previous and rank(options.variants) > rank(now.variants):
+    if previous and _RANK(options.variants) > _RANK(now.variants):
         lost.append(f"the variants side by side (--variants {options.variants})")
     return lost
 

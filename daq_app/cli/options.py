@@ -113,7 +113,7 @@ _SHARED: Mapping[str, dict[str, Any]] = {
     "kinematics": {"choices": _STRAINS, "default": "small"},
     "tau": {"choices": ["computed", "as-printed"], "default": "computed"},
     "paths": {"nargs": "?", "const": "small", "choices": _STRAINS, "default": "none", "metavar": "finite"},
-    "variants": {"choices": ["none", "small", "both"], "default": "small"},
+    "variants": {"choices": ["none", "small", "both"]},
     "height": {"type": number_in_range("--height", float, *HEIGHTS, _HEIGHTS), "metavar": "MM"},
     "simulate_subject": {"type": number_in_range("--simulate-subject", int, 0, LARGEST), "metavar": "SEED"},
     "headless": {"action": "store_true", "help": "no window: answers at the terminal, or simulated"},

@@ -25,11 +25,7 @@ def seal_prediction(recording: Recording, prediction: Mapping[str, Any]) -> str:
 
     Raises RecordingError where a seal is there, for none replaces another, or where nothing can be written.
     """
-    earlier = load_derived(recording.folder, SEAL)
-    if earlier is not None:
-        raise RecordingError(
-            f"{recording.folder / SEAL}: sealed on {earlier.get('sealed_utc')}, and none is sealed over it"
-        )
+    check_unsealed(recording)
     numbers = [{name: row[name] for name in SEAL_NUMBERS} for row in prediction["trials"]]
     sha256 = digest(numbers)
     document = {
@@ -41,6 +37,15 @@ def seal_prediction(recording: Recording, prediction: Mapping[str, Any]) -> str:
     }
     store_derived(recording.folder, SEAL, document)
     return sha256
+
+
+def check_unsealed(recording: Recording) -> None:
+    """Raise RecordingError where a seal is there."""
+    earlier = load_derived(recording.folder, SEAL)
+    if earlier is not None:
+        raise RecordingError(
+            f"{recording.folder / SEAL}: sealed on {earlier.get('sealed_utc')}, and none is sealed over it"
+        )
 
 
 def digest(numbers: Sequence[Mapping[str, Any]]) -> str:

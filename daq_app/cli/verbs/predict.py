@@ -6,16 +6,17 @@ the same press slid the other way.
 
 import argparse
 import math
+from dataclasses import replace
 from pathlib import Path
 
-from daq_app.batch.derived import analyse_session, open_visit, predict_session
+from daq_app.batch.derived import analyse_session, open_visit, predict_session, stored_options
 from daq_app.cli.options import add_analysis, add_flag, add_number, add_shared, add_visit, area_law, numbers_by_key
 from daq_app.console import DONE, FLAWED, Console, WrongValue, table
 from daq_app.wording import number
 from sessions.plan.protocols.protocol import DEEPEST_INDENTATION, INDENTATIONS
 from sessions.prediction import BY_NAME, SED, PredictionOptions, SessionPrediction, TrialPrediction, finger_in
 from sessions.prediction.afferent import AfferentSettings, firing_document, session_firing, settings_with
-from sessions.prediction.sealed_predictions import SEAL, seal_prediction
+from sessions.prediction.sealed_predictions import SEAL, check_unsealed, seal_prediction
 from sessions.prediction.stored import SedInterval
 from sessions.prediction.surface_series import other_signs
 from sessions.recording import Recording
@@ -34,13 +35,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         quantity="to print (--json has all)",
         variants="also with tau_max as printed, at the measured force, and slid the other way: at small strain (about "
         "a second), or at finite strain too (about a minute: limits are looked for where a surface has no settled "
-        "slide)",
+        "slide); small, or all that was predicted before",
     )
     meaning = "scene file with another finger; friction and loading are the trials'"
     parser.add_argument("--scene", type=Path, metavar="FILE", help=meaning)
     span = (math.ulp(0.0), DEEPEST_INDENTATION)
     add_number(parser, "--indentation", float, span, "instead of each block's own", None, "MM", INDENTATIONS)
-    add_flag(parser, "--intervals", "also what the uncertainty of friction makes of each SED (more solves)")
+    meaning = "also what the uncertainty of friction makes of each SED (more solves; as before where nothing is given)"
+    parser.add_argument("--intervals", action=argparse.BooleanOptionalAction, help=meaning)
     meaning = "also firing rates and spike times of an SA-II afferent that answers to that quantity: an illustration"
     add_flag(parser, "--afferent", meaning)
     meaning = "a parameter of the afferent, such as static_gain=30; --afferent prints all of them"
@@ -54,9 +56,21 @@ def run(options: argparse.Namespace, console: Console) -> int:
     afferent = _afferent(options)
     scene, remark = (None, "") if options.scene is None else finger_in(options.scene)
     console.note(remark or None)
-    values = {name: getattr(options, name) for name in ("indentation", "kinematics", "variants", "intervals")}
-    choices = PredictionOptions(options.tau, scene=scene, variant_intervals=options.intervals, **values)
     recording, _, unreadable = open_visit(options.session, options.subject, console)
+    if options.seal:
+        check_unsealed(recording)
+    stored = stored_options(recording, "small")
+    if options.intervals is not None:
+        stored = replace(stored, intervals=options.intervals, variant_intervals=options.intervals)
+    choices = PredictionOptions(
+        options.tau,
+        scene,
+        options.indentation,
+        kinematics=options.kinematics,
+        intervals=stored.intervals,
+        variant_intervals=stored.variant_intervals,
+        variants=options.variants or stored.variants,
+    )
     analysis = analyse_session(recording, console, area_law(options), gain_error=options.calibration_error)
     prediction = predict_session(recording, analysis, console, choices, afferent if options.afferent else None)
     seal = {"sealed_sha256": seal_prediction(recording, prediction.to_dict())} if options.seal else {}
@@ -100,7 +114,7 @@ def _print(
         unit, factor = quantity.shown_unit
         cells = [[trial, *_response(row, quantity.name, factor)] for trial, row in trials]
         console.say("", table(cells, header=["trial", f"{quantity.label} [{unit}]", "error"]))
-    if options.intervals:
+    if prediction.options.intervals:
         slopes = [(trial, row.interval or SedInterval(None, None, None)) for trial, row in trials]
         cells = [[trial, number(sed.by_mu, factor=1e4), number(sed.by_tau_max, factor=1e3)] for trial, sed in slopes]
         header = ["trial", "SED per 0.01 of mu [Pa]", "per kPa of tau_max [Pa]"]

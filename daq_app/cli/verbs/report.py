@@ -11,7 +11,7 @@ from daq_app.batch.derived import analyse_session, open_visit, predict_session, 
 from daq_app.cli.options import add_analysis, add_flag, add_shared, add_visit, area_law
 from daq_app.console import DONE, FLAWED, Console, WrongValue
 from sessions.plan.plan import Blinded
-from sessions.prediction import BY_NAME, PredictionOptions
+from sessions.prediction import BY_NAME
 from sessions.prediction.afferent import AfferentSettings, session_firing, usual_settings
 from sessions.recording import Recording
 from sessions.recording.derived import reveal, store_page
@@ -67,9 +67,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.afferent and (afferent is None or afferent.quantity != options.quantity):
         afferent = usual_settings(options.quantity)
     # What was asked before is asked again, so that nothing kept is lost, and what a page shows.
-    present_options = stored_options(recording) or PredictionOptions()
-    variants = max(present_options.variants, options.variants, key=("none", "small", "both").index)
-    choices = replace(present_options, intervals=True, variants=variants, course="history")
+    choices = replace(stored_options(recording, options.variants or "small"), intervals=True, course="history")
     prediction = predict_session(recording, analysis, console, choices, afferent)
     from sessions.report import findings
 
