@@ -1,1 +1,1 @@
-"""The shell people start."""
+"""The program: command line, window, recorder and batch jobs."""

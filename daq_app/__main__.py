@@ -1,4 +1,4 @@
-"""Start of the program."""
+"""Entry point of the program."""
 
 import gc
 import os
@@ -7,10 +7,10 @@ import sys
 
 
 def main() -> None:
-    """Run the command line, or without one open the window, and leave with the exit code."""
+    """Run the command line, or open the window if there are no arguments, and exit with its code."""
     answered = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if answered:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)  # until there is somebody to answer Ctrl-C with a sentence
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the program can answer Ctrl-C with a message
     _open_streams()
     from daq_app.child_process import keep_current_folder_out, use_one_thread
 
@@ -18,7 +18,7 @@ def main() -> None:
     use_one_thread()
     first = sys.argv[1] if len(sys.argv) > 1 else "window"
     if first == "window" or first.startswith("--subject-"):
-        from daq_app.qt.start import window  # the command line runs where Qt is not installed
+        from daq_app.qt.start import window  # the command line works without Qt
 
         sys.exit(window(sys.argv[1 + (first == "window") :]))
     from daq_app.cli.main import run
@@ -33,7 +33,7 @@ def main() -> None:
 
 
 def _repeat_stop(unraisable: "sys.UnraisableHookArgs") -> None:
-    """Press Ctrl-C once more where it came while Python let go of an object, where no exception leaves."""
+    """Repeat a Ctrl-C that arrived in a finaliser, from which no exception propagates."""
     if not issubclass(unraisable.exc_type, KeyboardInterrupt):
         sys.__unraisablehook__(unraisable)
         return
@@ -41,28 +41,28 @@ def _repeat_stop(unraisable: "sys.UnraisableHookArgs") -> None:
 
     from daq_app.child_process import press_ctrl_c
 
-    timer = threading.Timer(0.01, press_ctrl_c)  # at once, it would be raised in here, and end here too
+    timer = threading.Timer(0.01, press_ctrl_c)  # raised immediately, it would be lost in here too
     timer.daemon = True
     timer.start()
 
 
 def _open_streams() -> None:
-    """Open the null device in place of standard streams that are closed, so that no other file gets their number."""
+    """Open the null device in place of closed standard streams, so that no other file gets their descriptors."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode, encoding="utf-8"))
 
 
 def _leave(code: int) -> None:
-    """Leave with an exit code; at once where the user asked to stop and nothing is left to be ended."""
+    """Exit with a code; immediately if the user stopped the program and no child process is left."""
     from daq_app.console import STOPPED
 
-    module = sys.modules.get("multiprocessing")  # which takes a while to import, and most verbs start none
+    module = sys.modules.get("multiprocessing")  # slow to import, and most verbs start no process
     if code == STOPPED and not (module and module.active_children()):
         sys.stdout.flush()
         sys.stderr.flush()
-        os._exit(code)  # taking the loaded libraries apart first takes longer than Ctrl-C may
-    gc.freeze()  # what is left goes with the process: to look for cycles in it first takes a tenth of a cold solve
+        os._exit(code)  # finalising the loaded libraries takes longer than Ctrl-C may
+    gc.freeze()  # skips the last garbage collection, which takes a tenth of a cold solve
     sys.exit(code)
 
 

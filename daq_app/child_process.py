@@ -1,7 +1,7 @@
-"""How every Python process of the program starts: safe from the current folder, ended with the one that started it.
+"""Child processes in Python that import nothing from the current folder and end with their parent.
 
-Python itself puts the current folder first on the path of `python -m` and `python -c`, which is how child processes
-begin. A `random.py` that lies among somebody's recordings would be run in place of Python's own.
+Python puts the current folder first on the module path of `python -m` and `python -c`, which start the child
+processes. A `random.py` among somebody's recordings would run in place of Python's own.
 """
 
 import os
@@ -11,21 +11,21 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:  # multiprocessing takes a while to import, and most verbs start no process
+if TYPE_CHECKING:  # multiprocessing is slow to import, and most verbs start no process
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing.context import SpawnContext
     from multiprocessing.process import BaseProcess
 
-_BELOW = 5  # on POSIX, nice's steps towards the end of the queue
-BELOW_NORMAL = 0x4000  # on Windows, its name for the same
-MOST_WORKERS = 61  # on Windows, which waits for no more processes at once (Python's ProcessPoolExecutor)
-SAFE_PATH = "PYTHONSAFEPATH"  # a Python that finds this in its environment starts as with -P
+_BELOW = 5  # increment of nice on POSIX
+BELOW_NORMAL = 0x4000  # priority class on Windows
+MOST_WORKERS = 61  # on Windows, which can wait for no more processes (Python's ProcessPoolExecutor)
+SAFE_PATH = "PYTHONSAFEPATH"  # environment variable with the effect of -P
 
 
 def keep_current_folder_out() -> None:
-    """Take the folder that Python put first off the module path, and keep it off that of every child process.
+    """Remove the folder that Python put first from the module path, here and in every child process.
 
-    It is the current folder under `python -m daq_app`; the folder that holds the program itself stays.
+    Under `python -m daq_app` it is the current folder; the folder that holds the program stays.
     """
     os.environ[SAFE_PATH] = "1"
     if not sys.flags.safe_path and not __file__.startswith(f"{sys.path[0]}{os.sep}daq_app"):
@@ -33,7 +33,7 @@ def keep_current_folder_out() -> None:
 
 
 def use_one_thread() -> None:
-    """Let linear algebra run in one thread, here and in child processes, where numpy was not imported before.
+    """Run linear algebra in one thread, here and in child processes, unless numpy is already imported.
 
     The solver's matrices are small: threads only wait for each other (2 to 10 times slower), and change the last bits.
     """
@@ -41,24 +41,24 @@ def use_one_thread() -> None:
 
 
 def interpreter(*words: str) -> list[str]:
-    """Return the command that starts this Python with some words, for a child process."""
+    """Return the command that starts this Python interpreter with some arguments, for a child process."""
     return [sys.executable, "-P", *words]
 
 
 def fresh_processes() -> "SpawnContext":
-    """Return the context in which pools and processes of multiprocessing start, each with a Python of its own."""
+    """Return the context in which multiprocessing spawns each process with a fresh interpreter."""
     from multiprocessing import get_context
 
-    os.environ[SAFE_PATH] = "1"  # multiprocessing takes no option for the Python that it starts
+    os.environ[SAFE_PATH] = "1"  # multiprocessing cannot pass -P to the interpreter
     use_one_thread()
     return get_context("spawn")
 
 
 class Child:
-    """A process that ends with this one, at the other end of a pipe. Nothing here waits for it."""
+    """A process that ends with this one, at the other end of a pipe. No method waits for it."""
 
     def __init__(self, target: Callable[..., None], *more: object, name: str) -> None:
-        """Start it: `target` gets its end of the pipe, and `more`."""
+        """Start the process: `target` gets its end of the pipe, and `more`."""
         context = fresh_processes()
         self._pipe, child_end = context.Pipe()
         self.process: BaseProcess = context.Process(target=target, args=(child_end, *more), daemon=True, name=name)
@@ -69,18 +69,18 @@ class Child:
         """Send a message. Raises OSError where the process is gone."""
         self._pipe.send(message)
 
-    def receive(self) -> Any:  # noqa: ANN401  whatever the process sends
+    def receive(self) -> Any:  # noqa: ANN401  any message of the process
         """Return the next message, None where none has come. Raises EOFError or OSError where the process is gone."""
         return self._pipe.recv() if self._pipe.poll() else None
 
     def close(self) -> None:
-        """End it."""
+        """End the process."""
         self._pipe.close()
         self.process.terminate()
 
 
 def process_pool(workers: int) -> "ProcessPoolExecutor":
-    """Return a pool of processes that leave Ctrl-C to this one and end with it, however it ends."""
+    """Return a pool of processes that leave Ctrl-C to this one and end with it, even if it is killed."""
     from concurrent.futures import ProcessPoolExecutor
 
     workers = min(workers, MOST_WORKERS) if sys.platform == "win32" else workers
@@ -88,7 +88,7 @@ def process_pool(workers: int) -> "ProcessPoolExecutor":
 
 
 def _attend_parent() -> None:
-    """Leave Ctrl-C to the process that was asked to stop, and end where that one was killed."""
+    """Ignore Ctrl-C, which the parent handles, and end if the parent is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
@@ -99,11 +99,11 @@ def _end_with_parent() -> None:
     parent = parent_process()
     if parent is not None:
         parent.join()
-        os._exit(1)  # nobody is left to hand anything to
+        os._exit(1)  # nobody is left to take a result
 
 
 def press_ctrl_c() -> None:
-    """Send the main thread what Ctrl-C sends it, which also ends its sleep where the system can."""
+    """Interrupt the main thread as Ctrl-C does, which also ends its sleep on systems that allow it."""
     main_thread = threading.main_thread().ident
     if hasattr(signal, "pthread_kill") and main_thread is not None:
         signal.pthread_kill(main_thread, signal.SIGINT)
@@ -112,7 +112,7 @@ def press_ctrl_c() -> None:
 
 
 def give_way() -> None:
-    """Let this process go behind recorder and window; where the system refuses, nothing happens."""
+    """Lower this process's priority below recorder and window; if the system refuses, do nothing."""
     if sys.platform == "win32":
         import ctypes
 

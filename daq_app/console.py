@@ -1,4 +1,4 @@
-"""What a verb says to people and to scripts, kept apart, and how it reads what they ask for."""
+"""Output of a verb for people or for scripts, and the parser of its command line."""
 
 import argparse
 import io
@@ -18,26 +18,26 @@ from solver.progress import listening
 
 DONE, FAILED, WRONG, FLAWED, STOPPED = 0, 1, 2, 3, 130  # exit codes
 OUR_OWN = ("daq_app", "drivers", "sessions", "simulators", "solver")  # packages
-_COLUMNS = 80  # of a terminal that does not say how many it has
-_PATIENCE = 1.0  # of people, before they want to see that something is going on [s]
+_COLUMNS = 80  # of a terminal that does not report its width
+_PATIENCE = 1.0  # before people want to see progress [s]
 
 
 @dataclass(slots=True)
 class EndlessProgress:
-    """Progress of work whose end nobody knows: its present task counts as half of what is left."""
+    """Progress of work of unknown length: its present task counts as half of the remainder."""
 
     task: str
     fraction: float = 0.0  # of the whole, as shown
     _start: float = 0.0  # the part of the whole when its task began
 
     def hear(self, task: str, fraction: float) -> None:
-        """Take the name of the present task, and the part of it that is done."""
+        """Take the name of the present task, and the fraction of it that is done."""
         if task != self.task:
             self.task, self._start = task, self.fraction
         self.reach(self._start + 0.5 * fraction * (1.0 - self._start))
 
     def reach(self, fraction: float) -> None:
-        """Move on to this part of the whole; the end is only there when it is there."""
+        """Advance to this fraction of the whole, at most 99 %, and never back."""
         self.fraction = max(self.fraction, min(fraction, 0.99))
 
 
@@ -46,7 +46,7 @@ class WrongValue(Exception):
 
 
 class RecordingKept(KeyboardInterrupt):
-    """The user stopped work that had already recorded something; the message names the folder (exit code 3)."""
+    """The user stopped work that had already recorded data; the message names the folder (exit code 3)."""
 
 
 class NotWritten(Exception):
@@ -54,19 +54,19 @@ class NotWritten(Exception):
 
 
 def is_ours(error: Exception) -> bool:
-    """Say whether an error is of the program's own kinds, whose messages are sentences for people."""
+    """Say whether an error belongs to the program's own classes, whose messages are sentences for people."""
     return type(error).__module__.partition(".")[0] in OUR_OWN
 
 
 def accept_any_text(*streams: TextIO) -> None:
-    """Let each stream read and write what its encoding has no letters for as escapes: no answer is lost to a dash."""
+    """Let each stream escape characters that its encoding lacks, so that no answer is lost to a dash."""
     for stream in streams:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
 
 
 def harmless(text: str) -> str:
-    r"""Return text as a terminal may have it: control characters, which it would obey, are shown escaped.
+    r"""Escape the control characters of a text, which a terminal would obey.
 
     >>> print(harmless("a\x1b[31mb"))
     a\x1b[31mb
@@ -75,16 +75,16 @@ def harmless(text: str) -> str:
 
 
 class Console:
-    """Text for people on stdout, or one JSON document there and everything else on stderr."""
+    """Writes text for people to stdout, or one JSON document there and everything else to stderr."""
 
     def __init__(self, *, as_json: bool, out: TextIO | None = None, err: TextIO | None = None) -> None:
-        """Speak to people, or with `as_json` to scripts."""
+        """Write for people, or with `as_json` for scripts."""
         self.as_json = as_json
         self._out = out or sys.stdout
         self._err = err or sys.stderr
         self._last_line = 0.0
-        self._start = 0.0  # the job that progress is shown of [s]
-        self._fraction = 1.0  # of it
+        self._start = 0.0  # of the job whose progress is shown [s]
+        self._fraction = 1.0  # of that job
         self._line_open = False
         self._lost_results = False
 
@@ -94,7 +94,7 @@ class Console:
         return self._err.isatty()
 
     def say(self, *lines: str | None) -> None:
-        """Print lines for people, None left out; nothing where a script reads."""
+        """Print lines for people, without None; nothing if a script reads."""
         if not self.as_json:
             self._end_progress()
             for line in lines:
@@ -102,14 +102,14 @@ class Console:
                     self._answer(harmless(line))
 
     def note(self, *lines: str | None) -> None:
-        """Print lines on stderr, None left out: progress, warnings, losses."""
+        """Print lines on stderr, without None: progress, warnings, losses."""
         self._end_progress()
         for line in lines:
             if line is not None:
                 self._print_error(harmless(line))
 
     def lose(self, reason: object) -> None:
-        """Name the reason why a result, which may still be printed, is not kept; a verb that is done then has flaws."""
+        """Print why a result, which may still be printed, is not kept; the exit code is then that of flaws."""
         self._lost_results = True
         self.note(f"not kept: {reason}")
 
@@ -118,15 +118,15 @@ class Console:
         return FLAWED if code == DONE and self._lost_results else code
 
     def result(self, document: Mapping[str, Any]) -> None:
-        """Print the one JSON document; left out where a person reads. NaN and infinity are refused by the format."""
+        """Print the one JSON document, or nothing if a person reads. The format refuses NaN and infinity."""
         if self.as_json:
             self._end_progress()
             self._answer(json.dumps(document, indent=1, allow_nan=False))
 
     def progress(self, fraction: float, text: str, *, end_known: bool = True) -> None:
-        """Show how far a long job is (`fraction` from 0 to 1): a bar on a terminal, else now and then a new line.
+        """Show how far a long job is (`fraction` from 0 to 1): a bar on a terminal, else an occasional new line.
 
-        The bar shows rate and time left where the end is known. A `fraction` below the last one begins another job.
+        The bar shows rate and time left if the end is known. A `fraction` below the last one begins another job.
         """
         now = time.monotonic()
         if fraction < self._fraction:
@@ -143,7 +143,7 @@ class Console:
         self._line_open = terminal
 
     def reporter(self, text: str, until: float = 1.0) -> Callable[[float], bool]:
-        """Return what a long job calls with the part done (0 to 1), shown up to `until`; the answer is to go on."""
+        """Return a callback that takes the fraction done (0 to 1), shows it up to `until`, and returns True."""
 
         def report(fraction: float) -> bool:
             self.progress(until * fraction, text)
@@ -152,12 +152,12 @@ class Console:
         return report
 
     def counter(self, things: str, count: int) -> Callable[[float], None]:
-        """Return what a long job calls with the part done of so many things."""
+        """Return a callback that takes the fraction done and shows it as a number of `count` things."""
         return lambda fraction: self.progress(fraction, f"{round(fraction * count)} of {count} {things}")
 
     def _bar(self, text: str, now: float, end_known: bool) -> str:
-        """Return the line of a terminal: part done, text, bar, and where the end is known rate and time left."""
-        from tqdm import tqdm  # here: it takes longer to import than most verbs take to answer
+        """Return a terminal's line: fraction done, text, bar, and if the end is known, rate and time left."""
+        from tqdm import tqdm  # slower to import than most verbs are to answer
 
         try:
             columns = os.get_terminal_size(self._err.fileno()).columns or _COLUMNS
@@ -167,7 +167,7 @@ class Console:
             100.0 * self._fraction,
             100.0,
             now - self._start,
-            ncols=max(columns - 1, 1),  # a full line would be broken by some terminals
+            ncols=max(columns - 1, 1),  # some terminals would wrap a full line
             prefix=text,
             ascii=not (self._err.encoding or "").lower().startswith("utf"),
             unit="%",
@@ -176,10 +176,10 @@ class Console:
 
     @contextmanager
     def working(self, text: str) -> Generator[Callable[[float], bool]]:
-        """Show the task of work whose end nobody knows, once it has taken a second, and its time so far.
+        """Show the task of work of unknown length, once it has taken a second, and its time so far.
 
-        Yields a callback that takes the part done (0 to 1), and always answers to go on. The solver's present task
-        counts as half of what is left: the part shown moves on, and never back.
+        Yields a callback that takes the fraction done (0 to 1) and always returns True. The solver's present task
+        counts as half of the remainder: the fraction shown never decreases.
         """
         start, finish = time.monotonic(), threading.Event()
         underway = EndlessProgress(text)
@@ -216,7 +216,7 @@ class Console:
             ) from error
 
     def _print_error(self, text: str, end: str = "\n") -> None:
-        """Print on stderr; where that is full, or nobody reads it any more, what is being done goes on."""
+        """Print on stderr; if that is full or closed, the work continues."""
         with suppress(OSError):
             print(text, end=end, file=self._err, flush=True)
 
@@ -227,7 +227,7 @@ class Console:
 
 
 def point_advice(text: str) -> str:
-    """Return what to add to what is allowed where somebody typed a comma before a fraction.
+    """Return advice to add to an error message where somebody typed a decimal comma, else an empty text.
 
     >>> point_advice("'1,5'"), point_advice("1.5"), point_advice("1,5,2")
     (', its fraction behind a point', '', '')
@@ -236,14 +236,14 @@ def point_advice(text: str) -> str:
 
 
 class _Help(argparse.HelpFormatter):
-    """Fills each paragraph of a text to the width of the terminal, but for those with indented lines."""
+    """Wraps each paragraph of a text to the terminal's width, except those with indented lines."""
 
     def format_help(self) -> str:
-        """Return the text; a usage line is broken between choices too, which argparse keeps on one line."""
+        """Return the text; a usage line is wrapped between choices too, which argparse keeps on one line."""
         return "\n".join(map(self._break_choices, super().format_help().split("\n")))
 
     def _break_choices(self, line: str) -> str:
-        words = line.replace(" ", "\0").replace("\0|\0", "\0| ")  # a line breaks at a space alone
+        words = line.replace(" ", "\0").replace("\0|\0", "\0| ")  # lines wrap at spaces only
         indent = " " * (len(line) - len(line.lstrip()) + 1)
         wrapper = textwrap.TextWrapper(self._width, break_long_words=False, break_on_hyphens=False)
         wrapper.subsequent_indent = indent
@@ -255,11 +255,11 @@ class _Help(argparse.HelpFormatter):
 
 
 class Parser(argparse.ArgumentParser):
-    """Tells what is wrong with a command line in one sentence, without printing how all of it is used."""
+    """Reports an error in a command line in one sentence, without the whole usage text."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401  argparse's own
         super().__init__(*args, **kwargs, formatter_class=_Help)
-        # argparse's own takes -1e-3 and -inf for options
+        # argparse's own pattern takes -1e-3 and -inf for options
         self._negative_number_matcher = re.compile(r"-(\.?\d|inf$|nan$)", re.IGNORECASE)
 
     def error(self, message: str) -> NoReturn:
@@ -270,7 +270,7 @@ class Parser(argparse.ArgumentParser):
         raise WrongValue(f"{message}; '{self.prog} --help' explains")
 
     def print_help(self, file: object = None) -> None:  # noqa: ARG002  argparse's own
-        """Print how a command line is used; argparse itself would say nothing where that cannot be written."""
+        """Print the help; argparse itself ignores output that cannot be written."""
         Console(as_json=False).say(self.format_help().rstrip())
 
 

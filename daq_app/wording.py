@@ -11,19 +11,19 @@ from xml.etree import ElementTree
 
 SOURCE_LANGUAGE = "en"
 _FOLDER = Path(__file__).parent / "translations"
-VARIABLE = "DAQ_APP_LANGUAGE"  # names the experimenter's language to this process and to those that it starts
+VARIABLE = "DAQ_APP_LANGUAGE"  # the experimenter's language, for this process and its child processes
 SUBJECT, EXPERIMENTER = "subject", "experimenter"  # contexts: the name of a file is context_language.xlf
 
-POINTS = ".,\u066b\uff0e\uff0c"  # Latin, Arabic and full-width ones, before a number's fraction
+POINTS = ".,\u066b\uff0e\uff0c"  # Latin, Arabic and full-width decimal marks
 _PLAIN = re.compile(rf"(\d*)([{POINTS}]?)(\d*)")
-_MOST_DIGITS = 9  # of a range whose ends read alike with fewer
+_MOST_DIGITS = 9  # of a range whose ends look the same with fewer
 
 T = TypeVar("T")
 
 
 @lru_cache
 def translations(context: str, language: str) -> Mapping[str, str]:
-    """Return the texts of a language by the English ones; none where its file is missing or cannot be read."""
+    """Return the texts of a language by the English ones; empty if its file is missing or unreadable."""
     try:
         units = ElementTree.parse(_FOLDER / f"{context}_{language}.xlf").iterfind(".//{*}trans-unit")
     except (OSError, ElementTree.ParseError):
@@ -40,9 +40,9 @@ def languages(context: str) -> tuple[str, ...]:
 
 
 def tr(text: str, /, **values: object) -> str:
-    """Return a text of the experimenter's side in the language of this process, with `values` put in for its braces.
+    """Return a text of the experimenter's side in the language of this process, with `values` in its braces.
 
-    A text that is not translated, or whose translation has other braces, is returned in English.
+    A text without a translation, or whose translation has other braces, is returned in English.
 
     >>> tr("Trial {number} of {count}", number=3, count=10)
     'Trial 3 of 10'
@@ -57,7 +57,7 @@ def tr(text: str, /, **values: object) -> str:
 
 
 def tr_noop(texts: T) -> T:
-    """Return texts as they are. `daq-app translate` finds them here; whoever shows one calls `tr` (as QT_TR_NOOP)."""
+    """Mark texts for `daq-app translate`, like QT_TR_NOOP, and return them unchanged; call `tr` to show one."""
     return texts
 
 
@@ -68,13 +68,13 @@ COUNT_LABELS: Mapping[str, str] = tr_noop({  # of a transducer's `Health`, by th
 })  # fmt: skip
 
 
-_ANSWERS: Mapping[str, str] = tr_noop({  # by what became of a trial, or which of two was chosen
+_ANSWERS: Mapping[str, str] = tr_noop({  # by the outcome of a trial, or the choice of two
     "scored": "score {answer:.0f}", "numbered": "number {answer:.9g}", "first": "the first", "second": "the second",
 })  # fmt: skip
 
 
 def answer_text(outcome: str, answer: float | str | None) -> str:
-    """Return what a subject answered: a score, a number of its own, or which of two.
+    """Return a subject's answer as text: a score, a number on the subject's own scale, or a choice of two.
 
     >>> answer_text("scored", 37.4), answer_text("numbered", 0.125), answer_text("chosen", "first")
     ('score 37', 'number 0.125', 'the first')
@@ -85,7 +85,7 @@ def answer_text(outcome: str, answer: float | str | None) -> str:
 
 
 def quantity(value: float | None, digits: int, unit: str = "") -> str:
-    """Return a number with its unit and a true minus sign, never a minus zero; a dash where it is not known.
+    """Return a number with its unit and a true minus sign, never minus zero; a dash if it is unknown.
 
     >>> quantity(-0.001, 2, "N"), quantity(-1.25, 1), quantity(None, 0, "mm/s")
     ('0.00 N', '−1.2', '–')
@@ -96,9 +96,9 @@ def quantity(value: float | None, digits: int, unit: str = "") -> str:
 
 
 def number(value: float | None, digits: int = 3, *, factor: float = 1.0) -> str:
-    """Return a number times a factor with `digits` significant digits, and a dash where there is none.
+    """Return a number times a factor with `digits` significant digits, or a dash for None.
 
-    Of numbers below a million all digits before the point are there.
+    Numbers below a million have all digits before the point.
 
     >>> number(0.0052573, 3), number(None), number(0.012, factor=1e3), number(-1423.4, 2), number(99.96, 2)
     ('0.00526', '–', '12.0', '−1,423', '100')
@@ -112,7 +112,7 @@ def number(value: float | None, digits: int = 3, *, factor: float = 1.0) -> str:
 
 
 def aligned(count: int) -> str:
-    r"""Return a number of a row, as wide as one of two figures.
+    r"""Return a row number padded to two figures.
 
     >>> aligned(3), aligned(12)
     ('\u20073', '12')
@@ -121,10 +121,10 @@ def aligned(count: int) -> str:
 
 
 def typed_number(text: str, point: str = ".") -> float | None:
-    """Return the number that somebody typed, in digits of any script; None where it is no plain one.
+    """Return a typed number, in digits of any script; None if it is not a plain or unambiguous number.
 
-    Every mark stands before a fraction; but another one than the language's own `point`, with three digits behind it,
-    may group thousands.
+    Every mark is a decimal mark, but one other than the language's `point`, followed by three digits, may group
+    thousands.
 
     >>> typed_number("12,5"), typed_number("1,000"), typed_number("1,000", ","), typed_number("0,125")
     (12.5, None, 1.0, 0.125)
@@ -136,7 +136,7 @@ def typed_number(text: str, point: str = ".") -> float | None:
 
 
 def two_meanings(text: str, point: str = ".") -> tuple[str, str] | None:
-    """Return a number whose mark may group thousands, as it would be typed without and with a fraction; else None.
+    """Return both readings of a number whose mark may group thousands, without and with a fraction; else None.
 
     >>> two_meanings("1,250"), two_meanings("1.250", ","), two_meanings("1.250")
     (('1250', '1.250'), ('1250', '1,250'), None)
@@ -148,7 +148,7 @@ def two_meanings(text: str, point: str = ".") -> tuple[str, str] | None:
 
 
 def span(low: float, high: float, digits: int = 3) -> str:
-    """Return a range with `digits` significant digits, and more where its ends would read alike.
+    """Return a range with `digits` significant digits, or more if its ends would look the same.
 
     >>> span(1.0, 2.5), span(-178.94, -178.91), span(2.0, 2.0)
     ('1.00 to 2.50', '−178.94 to −178.91', '2.00 to 2.00')
@@ -159,12 +159,12 @@ def span(low: float, high: float, digits: int = 3) -> str:
 
 
 def errors_text(mesh: float | None, effect: str = "") -> str:
-    """Return what stands behind a number of the model: its relative error from the mesh, and from what is left out.
+    """Return the text after a number of the model: its relative errors, from the mesh and from omitted effects.
 
     >>> errors_text(0.0036, "viscosity 4 % of the SED"), errors_text(None)
     (' ± 0.36 % by the mesh; model: viscosity 4 % of the SED', '; mesh, model: no estimate')
     """
-    from solver.prediction import percent  # here: most verbs have no need of the solver
+    from solver.prediction import percent  # slow to load, and most verbs do not need it
 
     if mesh is None and not effect:
         return tr("; mesh, model: no estimate")
@@ -176,7 +176,7 @@ def errors_text(mesh: float | None, effect: str = "") -> str:
 
 
 def sentence(text: str) -> str:
-    """Return a text with a capital and a full stop; what begins with a name of a file or address keeps it as it is.
+    """Return a text with a capital and a full stop; a leading file name or address is kept unchanged.
 
     >>> sentence("there is no driver 'x'"), sentence("a.toml: no such file"), sentence("sim: has no rate 9")
     ("There is no driver 'x'.", 'a.toml: no such file.', 'sim: has no rate 9.')

@@ -1,1 +1,1 @@
-"""The recorder: a process of its own that holds the transducer and writes the session, whatever becomes of a window."""
+"""The recorder: a separate process that holds the transducer and writes the session, independent of any window."""

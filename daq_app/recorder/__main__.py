@@ -1,7 +1,7 @@
-"""The recorder's process: it takes requests down one pipe and reports up another, and nothing else reaches it.
+"""The recorder's process: requests come in through one pipe, reports go out through another.
 
-One main loop: between sessions it shows what the transducer measures, in a session `run_session` has the loop. When
-the client is gone the session in hand is ended by its rule (`session.py`) and the process ends.
+Between sessions the main loop shows the transducer's readings; during a session `session.run` has the loop. When
+the client is gone, the current session is ended by its rule (`session.py`) and the process ends.
 """
 
 import os
@@ -21,11 +21,11 @@ LAST_WORDS = 2.0  # for the client to fetch the last reports [s]
 
 
 def main(pace: float = 1.0) -> None:
-    """Serve the client at stdin and stdout until it goes, by a clock of that pace [-]."""
+    """Serve the client at stdin and stdout until it goes, with a clock of this pace [-]."""
     reading, writing = os.dup(0), os.dup(1)
-    # Whatever prints by mistake must not get between the messages.
+    # Stray prints must not mix with the messages.
     os.dup2(2, 1)
-    signal.signal(signal.SIGINT, lambda _signal, _frame: None)  # a nudge: it only breaks off waiting
+    signal.signal(signal.SIGINT, lambda _signal, _frame: None)  # a nudge that only interrupts waiting
     outbox = Outbox(writing)
     try:
         Recorder(Inbox(reading), outbox, clock_at(pace, LONGEST_STEP)).serve()
@@ -36,7 +36,7 @@ def main(pace: float = 1.0) -> None:
 
 
 class Recorder:
-    """What the process does."""
+    """The main loop of the process."""
 
     def __init__(self, inbox: Inbox, outbox: Outbox, clock: Clock) -> None:
         self._inbox = inbox
@@ -46,7 +46,7 @@ class Recorder:
         self._bench = Bench(clock, self._display, outbox.send)
 
     def serve(self) -> None:
-        """Do what is asked for until the client leaves."""
+        """Carry out requests until the client leaves."""
         while not self._inbox.leaving.is_set():
             self._attempt("Tare", self._bench.look)
             self._display.look(self._bench.health)
@@ -75,7 +75,7 @@ class Recorder:
                 raise NotNow("no session is running")
 
     def _session(self, prepare: Callable[[], SessionSetup]) -> None:
-        """Run a session; afterwards the transducer is shown as before."""
+        """Run a session; afterwards show the transducer again."""
         try:
             run(prepare(), self._bench, self._display, self._inbox, self._send)
         finally:
@@ -83,10 +83,10 @@ class Recorder:
             self._bench.stream()
 
     def _attempt(self, name: str, work: Callable[[], None]) -> None:
-        """Do something asked for; what goes wrong is reported, and ends nothing else."""
+        """Carry out a request; a failure is reported, and ends nothing else."""
         try:
             work()
-        except Exception as error:  # noqa: BLE001  an error of ours must not take the recorder along
+        except Exception as error:  # noqa: BLE001  a bug must not end the recorder
             error_name = type(error).__name__
             sentence = " ".join(str(error).split()) if is_ours(error) else f"unexpected {error_name} ({error})"
             self._send(m.Failed(name, sentence, error_name))

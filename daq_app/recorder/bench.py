@@ -1,4 +1,4 @@
-"""The transducer as the recorder holds it: opened, streaming while no session runs, lost, and back again."""
+"""The recorder's transducer: opening, streaming between sessions, loss and reconnection."""
 
 import time
 from collections.abc import Callable, Generator
@@ -21,12 +21,12 @@ from sessions.run.resuming import check_same_transducer
 from sessions.strokes.contacts import is_quiet
 from sessions.strokes.settings import DetectorSettings
 
-TRY_AGAIN = 1.0  # between two attempts to reach a transducer that was lost [real s]
-GLANCE = 0.01  # between two looks while no session runs [real s]
+TRY_AGAIN = 1.0  # between two attempts to reach a lost transducer [real s]
+GLANCE = 0.01  # between two polls while no session is running [real s]
 
 
 class NotNow(Exception):
-    """What was asked for is not possible now; the message says why and what to do."""
+    """A request is not possible now; the message says why and what to do."""
 
 
 _FAILURES = (LinkLost, DeviceFault, SetupError, RecordingError, NotNow)
@@ -34,7 +34,7 @@ _FAILURES = (LinkLost, DeviceFault, SetupError, RecordingError, NotNow)
 
 @contextmanager
 def _breakable(uri: str) -> Generator[None]:
-    """Let a stop break off what waits for a device, which may take its time. Raises NotNow when one did."""
+    """Let a stop interrupt waiting for a device. Raises NotNow if one did."""
     try:
         with interruptions() as interrupted, interrupted.raise_at_once():
             yield
@@ -43,10 +43,10 @@ def _breakable(uri: str) -> Generator[None]:
 
 
 class Tap(WrappedTransducer):
-    """A transducer whose readings are shown on their way into a session, which may have a clock that goes on."""
+    """A transducer whose readings are shown on their way into a session, and shifted to the session's clock."""
 
     def __init__(self, inner: Transducer, display: Display, clock_offset_ns: int) -> None:
-        """Show what `inner` gives on `display`; the session's clock is so far ahead of the transducer's [ns]."""
+        """Show the readings of `inner` on `display`; the session's clock is ahead by `clock_offset_ns` [ns]."""
         super().__init__(inner)
         self._display = display
         self._clock_offset_ns = clock_offset_ns
@@ -57,7 +57,7 @@ class Tap(WrappedTransducer):
         super().start()
 
     def read(self, timeout: float) -> ReadingBlock:
-        """Return the next readings, and show them."""
+        """Show and return the next readings."""
         block = super().read(timeout)
         block = replace(block, received_ns=block.received_ns + self._clock_offset_ns)
         self._display.take(block)
@@ -65,29 +65,29 @@ class Tap(WrappedTransducer):
 
 
 class Bench:
-    """At most one transducer. Its readings are shown while no session runs; a session takes it by `lend`."""
+    """At most one transducer. Its readings are shown between sessions; a session takes it by `lend`."""
 
     def __init__(self, clock: Clock, display: Display, send: Callable[[Report], None]) -> None:
         self._clock = clock
         self._display = display
         self._send = send
         self._stack = ExitStack()
-        self.connected: Connection | None = None  # what is open
-        self.uri: str | None = None  # of the transducer, as asked for
-        self._lost_info: TransducerInfo | None = None  # who it was when it was lost
-        self._retry_time = 0.0  # when to try once more [real s]
+        self.connected: Connection | None = None  # the open one
+        self.uri: str | None = None  # of the transducer, as requested
+        self._lost_info: TransducerInfo | None = None  # of the lost transducer
+        self._retry_time = 0.0  # of the next attempt [real s]
         self._tare: _Tare | None = None
-        self._streaming = False  # for nobody but the display
+        self._streaming = False  # to the display only
 
     @property
     def health(self) -> Health:
-        """Return the transducer's totals; none where there is none."""
+        """Return the transducer's totals; empty if no transducer is open."""
         return Health() if self.connected is None else self.connected.transducer.health
 
     def connect(self, uri: str, *, streaming: bool = True) -> None:
-        """Open the transducer at `uri` in place of any other, and begin to show what it measures where `streaming`.
+        """Open the transducer at `uri` in place of any other, and if `streaming` begin to show its readings.
 
-        Raises what opening and starting raise, NotNow when a stop broke it off; then none is open.
+        Raises what opening and starting raise, and NotNow if a stop interrupted it; then none is open.
         """
         self.disconnect()
         try:
@@ -100,14 +100,14 @@ class Bench:
             self.uri = None
             raise
         assert self.connected is not None
-        info = replace(self.connected.transducer.info, uri=uri)  # a simulated one is reached by an address of its own
+        info = replace(self.connected.transducer.info, uri=uri)  # a simulated one has a different address inside
         self._send(Device(info, self.connected.frame))
 
     @contextmanager
     def instead(self, uri: str) -> Generator[None]:
-        """Have the transducer at `uri` open inside; what goes wrong there, or in opening it, gives the former one back.
+        """Hold the transducer at `uri` open in the context; on failure there or in opening, reconnect the former one.
 
-        One in another place is let go of when that at `uri` has answered. Raises what goes wrong.
+        A former one at another place is closed only after the one at `uri` has answered. Raises the failure.
         """
         former = self.uri if self.connected is not None else None
         try:
@@ -137,7 +137,7 @@ class Bench:
             self._send(NoDevice())
 
     def begin_tare(self, duration: float) -> None:
-        """Measure the zero from now on. Raises NotNow where nothing streams."""
+        """Begin to measure the zero. Raises NotNow if nothing streams."""
         if self.connected is None:
             raise NotNow("no transducer is connected whose zero could be measured; connect one")
         if not 0.1 <= duration <= 60.0:
@@ -145,13 +145,13 @@ class Bench:
         self._tare = _Tare(duration)
 
     def end_tare(self, reason: str) -> None:
-        """Give up a tare under way."""
+        """Cancel a running tare."""
         if self._tare is not None:
             self._tare = None
             self._send(Failed("Tare", f"the zero was not measured: {reason}", "NotNow"))
 
     def stream(self) -> None:
-        """Begin to show what is measured, unless it is shown already. Raises NotNow when a stop broke it off."""
+        """Begin to show readings, unless they are shown already. Raises NotNow if a stop interrupted it."""
         if self.connected is not None and not self._streaming:
             try:
                 with _breakable(self.connected.transducer.info.uri):
@@ -163,7 +163,7 @@ class Bench:
                 raise
 
     def lend(self, clock_offset_ns: int) -> Tap | None:
-        """Return the transducer for a session whose clock is so far ahead, not streaming; None where there is none."""
+        """Return the transducer, not streaming, for a session with its clock ahead by an offset; None if none is open."""
         self.end_tare("a session began; zero again after it")
         if self.connected is None:
             return None
@@ -172,7 +172,7 @@ class Bench:
         return Tap(self.connected.transducer, self._display, clock_offset_ns)
 
     def look(self) -> None:
-        """Take what was measured, or try to find a lost transducer again. Raises NotNow when a tare is refused."""
+        """Take new readings, or try to reach a lost transducer again. Raises NotNow if a tare is refused."""
         time.sleep(GLANCE)
         if self.connected is None:
             self._look_for_it()
@@ -210,7 +210,7 @@ class Bench:
         self._stack.close()
 
     def lose(self, sentence: str) -> None:
-        """Let go of a transducer that fell silent, and look for it again later."""
+        """Close a transducer that fell silent, to be tried again later."""
         if self.connected is not None:
             self._lost_info = self.connected.transducer.info
             self._close()
@@ -246,14 +246,14 @@ class _Tare:
         self._blocks: list[ReadingBlock] = []
 
     def feed(self, block: ReadingBlock) -> bool:
-        """Take readings and say whether they are enough."""
+        """Add readings and say whether they suffice."""
         self._blocks.append(block)
         return float(block.time[-1]) - float(self._blocks[0].time[0]) >= self._duration
 
     def result(self, info: TransducerInfo) -> Tared:
-        """Return the zero. Raises NotNow where something moved."""
+        """Return the zero. Raises NotNow if the load changed."""
         block = ReadingBlock.concatenate(self._blocks)
-        # Readings come in lumps; the stretch has the length that was asked for.
+        # Readings come in lumps; use only the requested duration.
         stretch = block.between(0, int(np.count_nonzero(block.time <= block.time[0] + self._duration)))
         wrench = info.calibration.wrench(stretch.raw, np.zeros(6))
         settings = DetectorSettings()

@@ -1,29 +1,29 @@
-"""The face of the recorder for window and terminal: start it, send requests, poll reports, close.
+"""The recorder's client interface for window and terminal: start it, send requests, poll reports, close.
 
     with Recorder.start() as recorder:
         recorder.send(Connect("sim:?seed=7"))              # -> Device, then Live and HealthReport while it streams
         recorder.send(Tare())                              # -> Tared, or Failed("Tare", why)
         recorder.send(StartSession(plan, "recordings/P07", People("simulated hand", 7)))
-        for report in recorder.poll(0.05):                 # waits so long for the first; () when none came
+        for report in recorder.poll(0.05):                 # waits up to 0.05 s for the first; () if none came
             match report:
                 case AskMount(trial): ...                  # a command of sessions.run.steps: ask the experimenter
-                case LoggedEvent(): ...                    # written down and safe: the course so far
+                case LoggedEvent(): ...                    # stored safely: the session so far
                 case Status(safe=safe): ...                # the recording lamp: what the disk has acknowledged
                 case SessionEnded(folder, end): ...        # its end is written; Sealing and Sealed follow
                 case Gone(requested, sentence): ...            # always the last report
-        recorder.send(StimulusMounted("K31"))              # an event of sessions.run.steps: what somebody did
+        recorder.send(StimulusMounted("K31"))              # an event of sessions.run.steps: somebody's act
 
 Requests and reports are the dataclasses of `messages.py`, the events and commands of `run.steps`, `LoggedEvent`
-and `Status`. The recorder answers what it cannot do with `Failed(request, sentence)`; events that mean nothing now come
-back as the command `Refuse`. `Stop` is answered within 0.2 s: what waits for a device is broken off, a session gets its
-written end. No call waits, save `poll` for its timeout, `close`, and `Recorder.start` for the process to be
-made. `Recorder` may be used by one thread; `wake` is called by another whenever something new can be polled.
+and `Status`. The recorder answers an impossible request with `Failed(request, sentence)`, and an event that does not
+apply now with the command `Refuse`. `Stop` is answered within 0.2 s: waiting for a device is interrupted, a session
+gets its written end. No call waits, except `poll` for its timeout, `close`, and `Recorder.start` for the process to
+be created. Use `Recorder` from one thread; another thread calls `wake` whenever there is something to poll.
 
-The recorder is a child process at the other end of two pipes; nothing listens anywhere. Ctrl-C and the closing of a
-terminal do not reach it. **When the client goes** (ends, is killed, closes the pipe), a session in hand is recorded on
+The recorder is a child process at the other end of two pipes; no port is open. Ctrl-C and the closing of a
+terminal do not reach it. **When the client goes** (ends, is killed, closes the pipe), a running session is recorded
 until the finger has lifted, 30 s at most, then gets a written end whose cause is `client`, and the process ends.
 `ResumeSession(folder)`, sent to a new recorder, goes on at the same trial. **When the recorder goes**, the last report
-is `Gone`, all that was reported as safe is on the disk, and the same `ResumeSession` goes on.
+is `Gone`, all that was reported as safe is on the disk, and the same `ResumeSession` continues.
 """
 
 import os
@@ -39,14 +39,14 @@ from typing import Self
 from daq_app.child_process import interpreter, use_one_thread
 from daq_app.recorder.messages import REPORTS, REQUESTS, BrokenMessage, Codec, Gone, Report, Request, Shutdown
 
-_PATIENCE = 10.0  # for a recorder that was asked to end; it may be sealing [s]
+_PATIENCE = 10.0  # for a recorder to end; it may be sealing [s]
 
 
 class Recorder(AbstractContextManager["Recorder"]):
-    """A recorder's process, seen from outside."""
+    """The client of a recorder's process."""
 
     def __init__(self, process: subprocess.Popen[bytes], wake: Callable[[], None]) -> None:
-        """Use `Recorder.start`."""
+        """Not for direct use: call `Recorder.start`."""
         self._process = process
         self._wake = wake
         self._requests = Codec(REQUESTS)
@@ -62,9 +62,9 @@ class Recorder(AbstractContextManager["Recorder"]):
 
     @classmethod
     def start(cls, pace: float = 1.0, wake: Callable[[], None] = lambda: None, *, debug: bool = False) -> Self:
-        """Start a recorder whose clock runs `pace` times as fast as real (other than 1 on a simulated bench only).
+        """Start a recorder whose clock runs `pace` times as fast as real (not 1 only on a simulated bench).
 
-        With `debug` its errors go to our stderr. Raises OSError where no process can be made.
+        With `debug` its errors go to our stderr. Raises OSError if no process can be created.
         """
         use_one_thread()
         process = subprocess.Popen(
@@ -72,29 +72,29 @@ class Recorder(AbstractContextManager["Recorder"]):
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=None if debug else subprocess.DEVNULL,
-            # Out of reach of Ctrl-C and of a terminal that is closed: a session of its own; on Windows a group and a
-            # console of its own, without a window (CREATE_NEW_PROCESS_GROUP, CREATE_NO_WINDOW).
+            # Out of reach of Ctrl-C and of a terminal that is closed: a new session; on Windows a new process group
+            # and a console without a window (CREATE_NEW_PROCESS_GROUP, CREATE_NO_WINDOW).
             start_new_session=os.name == "posix",
             creationflags=0x0800_0200 if os.name == "nt" else 0,
         )
         return cls(process, wake)
 
     def __exit__(self, error_type: type[BaseException] | None, *_: object) -> None:
-        """Close it; where somebody pressed Ctrl-C without waiting."""
+        """Close the recorder; after Ctrl-C without waiting."""
         self.close(0.0 if error_type is not None and issubclass(error_type, KeyboardInterrupt) else _PATIENCE)
 
     @property
     def pid(self) -> int:
-        """Return the number of the recorder's process."""
+        """Return the recorder's process id."""
         return self._process.pid
 
     @property
     def silence(self) -> float:
-        """Return how long nothing was heard of the recorder [s]; more than 1 means that it hangs or sleeps."""
+        """Return the time since the recorder's last report [s]; more than 1 means that it hangs or sleeps."""
         return time.monotonic() - self._last_report_time
 
     def send(self, request: Request) -> None:
-        """Ask for something, or tell what was done. To a recorder that is gone it is sent in vain: `Gone` says so."""
+        """Send a request or an event. A recorder that is gone does not get it, which `Gone` reports."""
         self._asked_to_end |= isinstance(request, Shutdown)
         self._to_send.put(self._requests.encode(request))
 
@@ -106,9 +106,9 @@ class Recorder(AbstractContextManager["Recorder"]):
         return tuple(self._queue.popleft() for _ in range(len(self._queue)))
 
     def close(self, patience: float = _PATIENCE) -> None:
-        """End session and recorder, and wait for that; after `patience` [s] it is left to end by itself.
+        """End session and recorder, and wait; after `patience` [s] the recorder is left to end by itself.
 
-        A session that runs is stopped, sealed and over; `leave` cuts it short to be resumed. Harmless when repeated.
+        A running session is stopped and sealed for good; `leave` cuts it short to be resumed. Repeating is harmless.
         """
         if self._process.poll() is None:
             self.send(Shutdown())
@@ -121,11 +121,11 @@ class Recorder(AbstractContextManager["Recorder"]):
         self.leave()
 
     def kill(self) -> None:
-        """End the recorder as a crash would, to see that nothing acknowledged is lost."""
+        """Kill the recorder as a crash would, to test that nothing acknowledged is lost."""
         self._process.kill()
 
     def leave(self) -> None:
-        """Let go of the recorder: it ends by its rule for a client that is gone."""
+        """Disconnect from the recorder: it ends by its rule for a client that is gone."""
         self._to_send.put(None)
 
     def _read(self) -> None:
@@ -160,9 +160,9 @@ class Recorder(AbstractContextManager["Recorder"]):
         )
 
     def _write(self) -> None:
-        """Send requests; a pipe that is full holds up nobody else."""
+        """Send requests, in a thread, so that a full pipe blocks nobody else."""
         assert self._process.stdin is not None
-        with suppress(OSError, ValueError), self._process.stdin as pipe:  # it is gone: the reader says so
+        with suppress(OSError, ValueError), self._process.stdin as pipe:  # it is gone: the reader reports that
             while (message := self._to_send.get()) is not None:
                 pipe.write(message)
                 pipe.flush()

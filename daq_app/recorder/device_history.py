@@ -1,6 +1,7 @@
-"""What a transducer has been through: zeros, noise and overloads of a serial number, kept for its life.
+"""The history of a transducer: zeros, noise and overloads of a serial number, kept for its lifetime.
 
-One text file a serial number on this computer, a JSON object a line, only ever added to. Simulated ones have none.
+Each serial number has one append-only text file on this computer, with a JSON object per line. Simulated transducers
+have none.
 """
 
 import json
@@ -25,27 +26,27 @@ class Life:
     """A serial number's history in short."""
 
     zeros: int  # measured so far
-    since: str  # day of the first one, YYYY-MM-DD; nothing where there is none
+    since: str  # day of the first one, YYYY-MM-DD; "" if there is none
     drift: tuple[float, ...]  # (6,) from the first zero to the last [N, N mm]
     noise: tuple[float, ...]  # (6,) median standard deviation at rest [N, N mm]
     overloads: int
-    last_overload: str  # its day; nothing where there is none
+    last_overload: str  # its day; "" if there is none
 
 
 def remember_zero(info: TransducerInfo, mean: Sequence[float], spread: Sequence[float]) -> None:
-    """Keep a zero and its noise [raw units], as a wrench by the calibration in force."""
-    matrix = info.calibration.in_own_frame(info.calibration.matrix.T).T  # whatever tool is on it today
-    noise = np.sqrt(matrix**2 @ np.square(spread))  # gauges are taken to be independent of each other
+    """Store a zero and its noise [raw units] as wrenches, by the current calibration."""
+    matrix = info.calibration.in_own_frame(info.calibration.matrix.T).T  # independent of the present tool
+    noise = np.sqrt(matrix**2 @ np.square(spread))  # gauges are assumed independent
     _add(info, "zero", {"wrench": (matrix @ np.array(mean)).tolist(), "noise": noise.tolist()})
 
 
 def remember_overload(info: TransducerInfo, greatest: Sequence[float]) -> None:
-    """Keep an overload: the greatest loads (7,) [-], six axes and combined."""
+    """Store an overload: the greatest loads (7,) [-], six axes and combined."""
     _add(info, "overload", {"greatest": list(greatest)})
 
 
 def life_of(serial: str) -> Life | None:
-    """Return the history of a serial number, None where nothing is kept of it; torn lines are left out."""
+    """Return the history of a serial number, without torn lines; None if it has none."""
     lines = _lines(serial)
     if not lines:
         return None
@@ -71,7 +72,7 @@ def _add(info: TransducerInfo, kind: Kind, data: dict[str, Any]) -> None:
     with suppress(OSError):  # a full disk must not end a session over this
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("a", encoding="utf-8") as file:
-            file.write(f"\n{line}\n")  # a line before that a full disk cut short is ended first
+            file.write(f"\n{line}\n")  # the leading newline ends a line that a full disk cut short
 
 
 def _lines(serial: str) -> list[dict[str, Any]]:
@@ -83,7 +84,7 @@ def _lines(serial: str) -> list[dict[str, Any]]:
 
 
 def _parse(text: str) -> dict[str, Any] | None:
-    """Return one line of the history, None where it was cut short or has another form."""
+    """Return one line of the history, None if it was cut short or has another form."""
     try:
         line = json.loads(text)
         numbers = line["wrench"] + line["noise"] if line["kind"] == "zero" else line["greatest"]

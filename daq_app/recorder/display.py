@@ -1,4 +1,4 @@
-"""What is shown of the transducer while it streams: its readings as a wrench, its health, its overloads."""
+"""Live display of a streaming transducer: its readings as a wrench, its health, its overloads."""
 
 import time
 from collections import deque
@@ -16,12 +16,12 @@ from drivers.transducer import Health, TransducerInfo
 
 LIVE_EVERY = 1 / 60  # least time between two messages of readings [real s]
 HEALTH_EVERY = 0.1  # between two of health [real s]
-RATE_OVER = 1.0  # stretch the rate is measured over [real s]
+RATE_OVER = 1.0  # averaging time of the rate [real s]
 _UNLOADED: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Display:
-    """Gathers what streams, and sends it now and then. Nothing here touches what is recorded."""
+    """Gathers the stream and sends it periodically. It does not affect the recording."""
 
     def __init__(self, send: Callable[[Report], None], factor: float) -> None:
         """Send through `send`; the clock runs `factor` times as fast as real."""
@@ -34,13 +34,13 @@ class Display:
         self._load = self._peak = np.zeros(7)
         self._overload_told = False
         self._saturated = 0  # since somebody acknowledged
-        self._counted = 0  # of them in the totals of this stream
+        self._counted = 0  # of those, in the totals of this stream
         self._arrivals: deque[tuple[float, int]] = deque()  # real time [s] and readings, over the last second
         self._live_due = self._health_due = 0.0
         self._newest_time = 0.0  # when the newest reading came, or the stream began [real s]
 
     def device(self, info: TransducerInfo | None) -> None:
-        """Show this transducer from now on, or none. Zero and peaks stay: it may be the one of before."""
+        """Show this transducer from now on, or none. Zero and peaks stay: it may be the same one as before."""
         self._flush()
         self._info = info
         self._load = np.zeros(7)
@@ -54,7 +54,7 @@ class Display:
         self.acknowledge()
 
     def stream_began(self) -> None:
-        """Take what comes next as a new stream, whose time and numbers restart."""
+        """Begin a new stream, whose time and numbers restart."""
         self._flush()
         self._stream += 1
         self._newest_time = time.monotonic()
@@ -74,14 +74,14 @@ class Display:
         self._health_due = 0.0
 
     def take(self, block: ReadingBlock) -> None:
-        """Take readings, of the stream that runs."""
+        """Take readings of the current stream."""
         if len(block) and self._info is not None:
             self._blocks.append(block)
             self._newest_time = time.monotonic()
             self._arrivals.append((self._newest_time, len(block)))
 
     def look(self, health: Health, *, streaming: bool = True) -> None:
-        """Send what is due; where it is not `streaming`, nobody waits for readings."""
+        """Send the messages that are due; without `streaming`, missing readings count as no silence."""
         now = time.monotonic()
         if now >= self._live_due:
             self._live_due = now + LIVE_EVERY
@@ -139,5 +139,5 @@ class Display:
 
 
 def six(values: Array) -> Six:
-    """Return six numbers (6,) as plain ones."""
+    """Return an array (6,) as a tuple of floats."""
     return cast("Six", tuple(float(value) for value in values))

@@ -1,9 +1,9 @@
-"""What recorder and client say to each other: plain data, frozen, and packed as bytes on a pipe.
+"""Messages between recorder and client: frozen plain data, packed as bytes on a pipe.
 
-Beside what stands here, the client sends every event of `run.steps` (what experimenter and subject do), and the
-recorder sends every command of `sessions.run.steps` (what they are asked for), each `LoggedEvent` once it is safe, and
+In addition, the client sends every event of `sessions.run.steps` (acts of experimenter and subject), and the
+recorder sends every command of `sessions.run.steps` (requests to them), each `LoggedEvent` once it is safe, and
 `Status` ten times a second [session clock]. A message is a length of four bytes, then MessagePack of [name, fields].
-Nothing in it can be run.
+It cannot contain code.
 """
 
 import struct
@@ -30,7 +30,7 @@ Kind = Literal["people", "simulated hand", "simulated people"]
 
 
 class Connect(Struct, frozen=True):
-    """Open the transducer at this address and show what it measures; one that was open before is closed."""
+    """Open the transducer at this address and show its readings; one that was open before is closed."""
 
     uri: str
 
@@ -40,7 +40,7 @@ class Disconnect(Struct, frozen=True):
 
 
 class Tare(Struct, frozen=True):
-    """Measure the zero of the bench with nothing touching, for what is shown live. Not during a session."""
+    """Measure the zero of the bench with nothing touching, for the live display. Not during a session."""
 
     duration: float = 1.0  # [s, device time]
 
@@ -51,9 +51,9 @@ class AcknowledgeOverloads(Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class People:
-    """Who does what is asked for. Simulated ones need a simulated bench, or a visit that only scores.
+    """Who acts in the session. Simulated people need a simulated bench, or a visit that only scores.
 
-    A simulated hand mounts nothing and judges nothing: it strokes when a stroke is asked for, and people do the rest.
+    A simulated hand neither mounts nor judges: it strokes on request, and people do the rest.
     """
 
     kind: Kind = "people"
@@ -62,17 +62,17 @@ class People:
 
 
 class StartSession(Struct, frozen=True):
-    """Begin a session in `folder`, which is made or is empty; with forces the transducer that is open records it."""
+    """Begin a session in `folder`, which is new or empty; with forces, the open transducer records it."""
 
     plan: SessionPlan
     folder: str
     people: People = field(default_factory=People)
-    settings: tuple[Setting, ...] = ()  # that shaped it, for its provenance
-    any_folder: bool = False  # also on a network drive or in a synchronised folder; this is recorded
+    settings: tuple[Setting, ...] = ()  # for its provenance
+    any_folder: bool = False  # allow a network drive or a synchronised folder; this is recorded
 
 
 class ResumeSession(Struct, frozen=True):
-    """Go on with the session in `folder`, that was cut short: at the same trial, with the people it began with."""
+    """Resume the session in `folder` that was cut short: at the same trial, with the people it began with."""
 
     folder: str
     uri: str | None = None  # of its transducer; None: where it was when the session began
@@ -80,11 +80,11 @@ class ResumeSession(Struct, frozen=True):
 
 
 class Stop(Struct, frozen=True):
-    """End at once what is being done, session included, with a written end."""
+    """End the current work immediately; a session gets its written end."""
 
 
 class Shutdown(Struct, frozen=True):
-    """End the session, if one runs, then the process."""
+    """End the session, if one is running, then the process."""
 
 
 Request = (
@@ -98,7 +98,7 @@ class Device(Struct, frozen=True, eq=False):
     """The transducer is open."""
 
     info: TransducerInfo
-    frame: Frame | None  # how its axes lie to the face, where a simulated or recorded bench knows; else None
+    frame: Frame | None  # orientation of its axes to the face, for a simulated or recorded bench; else None
 
 
 class NoDevice(Struct, frozen=True):
@@ -106,31 +106,31 @@ class NoDevice(Struct, frozen=True):
 
 
 class HealthReport(Struct, frozen=True):
-    """Ten times a second, also where no transducer is open: a recorder that is silent for longer hangs or sleeps."""
+    """Sent ten times a second, even if no transducer is open: a recorder that is silent for longer hangs or sleeps."""
 
     health: Health  # totals since the stream began
-    rate: float  # readings a second over the machine's last second [Hz]; of a paced clock simulated seconds
+    rate: float  # readings per second over the last real second [Hz]; with a paced clock per simulated second
     load: tuple[float, ...]  # (7,) the greatest since the last report, nothing subtracted [-]; nan: no rated range
     peak: tuple[float, ...]  # (7,) the same since somebody acknowledged overloads; both as `drivers.calibration.loads`
-    saturated: int  # readings the device called invalid since somebody acknowledged
-    silence: float = 0.0  # since the newest reading, or since the stream began; 0 where nothing need come [real s]
+    saturated: int  # readings the device marked invalid since somebody acknowledged
+    silence: float = 0.0  # since the newest reading or the start of the stream; 0 if none is expected [real s]
 
 
 class Live(Struct, frozen=True, eq=False):
-    """What was measured since the last such message, every reading of it; at most 60 a second."""
+    """All readings since the last such message; at most 60 messages a second."""
 
-    stream: int  # grows where time and sequence restart
+    stream: int  # increases when time and sequence restart
     sequence: Indices  # (n,)
     time: Array  # (n,) [s, device clock]
     received_ns: Indices  # (n,) session clock [ns]
     wrench: Array  # (n, 6) [N, N mm] of the finger on the stimulus, transducer axes, zero subtracted
-    status: Indices  # (n,) 0: nothing speaks against the reading
-    zero: Six  # raw units, that was subtracted: of the last tare or take; zeros where nothing was measured
+    status: Indices  # (n,) 0: the reading is sound
+    zero: Six  # subtracted [raw units], of the last tare or take; zeros if none was measured
     left_out: int = 0  # readings before these that were not sent, because the client did not fetch them
 
 
 class Tared(Struct, frozen=True):
-    """The zero of the bench was measured, and is subtracted from what is shown live from now on."""
+    """The zero of the bench was measured, and is subtracted from the live readings from now on."""
 
     mean: Six  # raw units
     spread: Six  # standard deviation, raw units
@@ -145,22 +145,22 @@ class SessionBegun(Struct, frozen=True):
     folder: str
     plan: SessionPlan
     people: Kind
-    simulated: str | None  # the sentence that heads every file, where something is simulated
+    simulated: str | None  # the sentence at the head of every file, if something is simulated
     clock_offset_ns: int  # session clock minus the machine's monotonic one [ns]; a simulated clock has no offset
     factor: float  # session seconds in one real second [-]
-    events: tuple[LoggedEvent, ...] = ()  # all that was recorded before, of a session that goes on
+    events: tuple[LoggedEvent, ...] = ()  # recorded earlier, in a resumed session
 
 
 class SessionEnded(Struct, frozen=True):
-    """A session has its written end; what was recorded is safe."""
+    """A session has its written end, and its recording is safe."""
 
     folder: str
     end: SessionEnd
-    resumable: bool  # it can go on, and is not sealed by itself
+    resumable: bool  # it can be resumed, and is not sealed automatically
 
 
 class Sealing(Struct, frozen=True):
-    """The sealed copy of a session is being made; the live file is whole already. The recorder is silent meanwhile."""
+    """The sealed copy of a session is being made, without reports meanwhile; the live file is already complete."""
 
     folder: str
 
@@ -180,7 +180,7 @@ class Failed(Struct, frozen=True):
 
 
 class LinkDown(Struct, frozen=True):
-    """The transducer no longer answers. It is tried again every second."""
+    """The transducer no longer answers. The recorder tries it again every second."""
 
     sentence: str
 
@@ -189,11 +189,11 @@ class LinkBack(Struct, frozen=True, eq=False):
     """The transducer answers again."""
 
     info: TransducerInfo
-    same: bool  # it is the one that was open before, set and calibrated alike
+    same: bool  # the same transducer with the same settings and calibration as before
 
 
 class Gone(Struct, frozen=True):
-    """The recorder's process has ended; said by the client itself, once, as the last message."""
+    """The recorder's process has ended; the client itself reports this, once, as the last message."""
 
     requested: bool  # by us
     sentence: str
@@ -209,21 +209,21 @@ REPORTS: tuple[type, ...] = get_args(Report)
 
 
 LENGTH_PREFIX = struct.Struct("<I")
-_LONGEST = 256 * 2**20  # a longer message is none of ours [bytes]
+_LONGEST = 256 * 2**20  # a longer message is invalid [bytes]
 
 
 class BrokenMessage(Exception):
-    """What came down the pipe is no message of ours."""
+    """The bytes from the pipe are not a valid message."""
 
 
 class Codec:
-    """Packs and unpacks messages of the types it was given; a type is known by its name."""
+    """Packs and unpacks messages of given types, identified by their names."""
 
     def __init__(self, types: Iterable[type]) -> None:
         self._types = {cls.__name__: cls for cls in types}
 
     def read(self, file: IO[bytes]) -> Iterator[Any]:
-        """Yield each message of a pipe until its other end goes, which may cut the last. Raises BrokenMessage."""
+        """Yield each message of a pipe until its other end closes, perhaps within the last. Raises BrokenMessage."""
         while len(prefix := file.read(LENGTH_PREFIX.size)) == LENGTH_PREFIX.size:
             (length,) = LENGTH_PREFIX.unpack(prefix)
             if length > _LONGEST:
@@ -236,8 +236,8 @@ class Codec:
         body = msgspec.msgpack.encode((type(message).__name__, message), enc_hook=_array_out)
         return LENGTH_PREFIX.pack(len(body)) + body
 
-    def decode(self, body: bytes) -> Any:  # noqa: ANN401  one of the types it was given
-        """Return the message of these bytes, which are without the length. Raises BrokenMessage."""
+    def decode(self, body: bytes) -> Any:  # noqa: ANN401  one of the given types
+        """Return the message in these bytes, which exclude the length. Raises BrokenMessage."""
         try:
             name, fields = msgspec.msgpack.decode(body, type=tuple[str, msgspec.Raw])
             return msgspec.msgpack.decode(fields, type=self._types[name], dec_hook=_array_in)
@@ -246,15 +246,15 @@ class Codec:
 
 
 def _array_out(value: object) -> object:
-    """Return an array as its kind, shape and bytes."""
+    """Return an array as dtype, shape and bytes."""
     if isinstance(value, np.ndarray):
         array = cast("NDArray[Any]", value)
         return array.dtype.str, array.shape, array.tobytes()
     raise NotImplementedError(type(value).__name__)
 
 
-def _array_in(_: type, value: Any) -> NDArray[Any]:  # noqa: ANN401  what MessagePack holds
-    """Return the array that `_array_out` gave this for. Raises ValueError where it is none of numbers."""
+def _array_in(_: type, value: Any) -> NDArray[Any]:  # noqa: ANN401  any MessagePack value
+    """Return the array encoded by `_array_out`. Raises ValueError if it is not numeric."""
     dtype_name, shape, content = value
     dtype = np.dtype(dtype_name)
     if dtype.kind not in "if":

@@ -1,4 +1,4 @@
-"""The recorder's ends of its pipes: what is asked for comes in, what is to be shown goes out."""
+"""The recorder's ends of its pipes: requests come in, reports go out."""
 
 import os
 import threading
@@ -12,12 +12,12 @@ from msgspec import structs
 from daq_app.child_process import press_ctrl_c
 from daq_app.recorder import messages as m
 
-POKE_EVERY = 0.05  # between two nudges of the main thread by a stop nobody has answered [s]
+POKE_EVERY = 0.05  # between two nudges of the main thread by an unanswered stop [s]
 MOST_LIVE = 120  # messages of readings waiting to be fetched; later ones are left out, and counted
 
 
 class Inbox:
-    """Requests as they come, read by a thread; a stop nudges the main thread out of whatever it waits for."""
+    """Incoming requests, read by a thread; a stop nudges the main thread out of any waiting."""
 
     def __init__(self, reading: int) -> None:
         self._reading = reading
@@ -25,15 +25,15 @@ class Inbox:
         self._nudge_lock = threading.Lock()
         self.client_gone = threading.Event()
         self.stop_wanted = threading.Event()
-        self.leaving = threading.Event()  # a shutdown was asked for, or nobody is left to ask
+        self.leaving = threading.Event()  # on a shutdown, or when the client is gone
         threading.Thread(target=self._read, name="requests", daemon=True).start()
 
     def take_requests(self) -> tuple[m.Request, ...]:
-        """Return what was asked for since the last call, in order."""
+        """Return the requests since the last call, in order."""
         return tuple(self._queue.popleft() for _ in range(len(self._queue)))
 
     def answer_stop(self) -> None:
-        """End the nudging: what comes next is not to be broken off."""
+        """End the nudging, so that later work is not interrupted."""
         with self._nudge_lock:
             self.stop_wanted.clear()
 
@@ -46,12 +46,12 @@ class Inbox:
                     self.stop_wanted.set()
                     threading.Thread(target=self._nudge, name="nudge", daemon=True).start()
                 self._queue.append(request)
-        # A client that cannot be understood is as good as gone.
+        # A client that sends invalid messages counts as gone.
         self.client_gone.set()
         self.leaving.set()
 
     def _nudge(self) -> None:
-        """Break off what the main thread waits for, again and again until it has noticed."""
+        """Interrupt the main thread's waiting repeatedly until it has noticed."""
         while True:
             with self._nudge_lock:
                 if not self.stop_wanted.is_set():
@@ -61,7 +61,7 @@ class Inbox:
 
 
 class Outbox:
-    """Reports on their way to the client. Whoever sends never waits, whatever the client does."""
+    """Reports on their way to the client. Sending never waits for the client."""
 
     def __init__(self, writing: int) -> None:
         self._file = os.fdopen(writing, "wb", closefd=False)
@@ -73,7 +73,7 @@ class Outbox:
         threading.Thread(target=self._write, name="reports", daemon=True).start()
 
     def send(self, report: m.Report) -> None:
-        """Have a report sent. Readings the client does not fetch are left out, and their number is sent."""
+        """Queue a report. Readings that the client does not fetch are left out and counted."""
         with self._lock:
             if isinstance(report, m.Live | m.HealthReport):
                 if self._live >= MOST_LIVE:
@@ -86,7 +86,7 @@ class Outbox:
             self._reports.put(report)
 
     def flush(self, patience: float) -> None:
-        """Wait until everything was taken by the client, but not longer than `patience` [s]."""
+        """Wait until the client has taken everything, but not longer than `patience` [s]."""
         with self._reports.all_tasks_done:
             self._reports.all_tasks_done.wait_for(lambda: not self._reports.unfinished_tasks, patience)
 
@@ -105,8 +105,8 @@ class Outbox:
             self._reports.task_done()
 
     def _encode(self, report: m.Report) -> bytes:
-        """Return the bytes of a report, or of a sentence where it cannot be encoded, so that others still go out."""
+        """Return the bytes of a report, or of a failure if it cannot be encoded, so that others are still sent."""
         try:
             return self._codec.encode(report)
-        except Exception as error:  # noqa: BLE001  the client must not go blind for an error of ours
+        except Exception as error:  # noqa: BLE001  a bug must not cut the client off
             return self._codec.encode(m.Failed(type(report).__name__, f"a report could not be sent ({error})"))

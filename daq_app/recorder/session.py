@@ -1,4 +1,4 @@
-"""One session inside the recorder: begun or gone on with, run with the client as its operator, and sealed."""
+"""One session in the recorder: begun or resumed, run with the client as its operator, and sealed."""
 
 import os
 import shutil
@@ -33,15 +33,15 @@ from sessions.run.runner import STOPPED_BY_USER, Continuation, Ending, Operator,
 from sessions.run.steps import Command, Event
 
 WHY = "a session is being recorded"
-# For SetThreadExecutionState of Windows: until the next call; the system must stay on (its screen may not).
+# For SetThreadExecutionState of Windows: until the next call; keep the system on (not the screen).
 CONTINUOUS, SYSTEM_REQUIRED = 0x8000_0000, 0x0000_0001
 
 
 @contextmanager
 def awake() -> Generator[bool]:
-    """Hold the computer awake while inside; True where the system was asked, which it may still refuse.
+    """Keep the computer awake in the context; yields True if the system was asked, which it may still refuse.
 
-    What is asked for ends with this process, however it ends. A lid that is closed or an empty battery wins.
+    The request ends with this process, even if it is killed. A closed lid or an empty battery overrides it.
     """
     process = None
     command = holder(os.getpid(), sys.platform)
@@ -61,37 +61,37 @@ def awake() -> Generator[bool]:
 
 
 def holder(pid: int, system: str) -> Sequence[str] | None:
-    """Return a command that holds the computer awake as long as the process `pid` lives; None where none is known.
+    """Return a command that keeps the computer awake while the process `pid` lives; None if none is known.
 
     >>> holder(7, "darwin")
     ('caffeinate', '-i', '-w', '7')
     """
     if system == "darwin":
         return "caffeinate", "-i", "-w", str(pid)
-    if system == "linux":  # tail ends with the process it watches: nothing is left behind by a crash
+    if system == "linux":  # tail ends with the process it watches, even after a crash
         options = ("--what=sleep:idle", "--who=daq-app", f"--why={WHY}", "--mode=block")
         return "systemd-inhibit", *options, "tail", f"--pid={pid}", "-f", "/dev/null"
     return None
 
 
 def _windows(state: int) -> bool:
-    """Ask Windows to stay on, or no longer; False on other systems, and where it refuses."""
+    """Set the execution state of Windows; return False on other systems, or if it refuses."""
     import ctypes
 
     windows = getattr(ctypes, "windll", None)
     return windows is not None and windows.kernel32.SetThreadExecutionState(state) != 0
 
 
-LIFT_PATIENCE_NS = 30_000_000_000  # for a finger that touches when the client goes [session clock]
+LIFT_PATIENCE_NS = 30_000_000_000  # for a finger in contact when the client goes [session clock]
 CLIENT_GONE = "the window or terminal that ran the session is gone"
 ANY_FOLDER = "recorded in an unsafe folder"  # name of a setting
-SURFACE_FRICTION = "planted friction"  # likewise: descriptor, index and friction of simulated surfaces
+SURFACE_FRICTION = "planted friction"  # name of a setting: descriptor, index and friction of simulated surfaces
 Send = Callable[[m.Report], None]
 
 
 @dataclass(frozen=True, slots=True)
 class SessionSetup:
-    """All that a session needs to run."""
+    """Everything that a session needs to run."""
 
     plan: SessionPlan
     writer: SessionWriter
@@ -100,11 +100,11 @@ class SessionSetup:
     info: TransducerInfo | None
     clock_offset_ns: int = 0
     continuation: Continuation | None = None
-    earlier_events: tuple[LoggedEvent, ...] = ()  # all that was recorded before
+    earlier_events: tuple[LoggedEvent, ...] = ()  # of the session that is resumed
 
 
 def begin(request: m.StartSession, bench: Bench, clock: Clock) -> SessionSetup:
-    """Begin to record in a new folder. Raises RecordingError, SetupError or NotNow."""
+    """Begin recording in a new folder. Raises RecordingError, SetupError or NotNow."""
     plan, people = request.plan, request.people
     if plan.forces and bench.connected is None:
         raise NotNow("a session with forces needs a transducer, and none is connected; connect one")
@@ -127,11 +127,11 @@ def begin(request: m.StartSession, bench: Bench, clock: Clock) -> SessionSetup:
 
 
 def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> SessionSetup:
-    """Go on with a session that was cut short. Raises RecordingError, NotNow, and as opening its transducer does."""
+    """Resume a session that was cut short. Raises RecordingError, NotNow, and as opening its transducer does."""
     folder = Path(request.folder)
     if is_sealed(folder):
         raise RecordingError(f"{folder} is sealed: nothing is added to it; begin a new session")
-    fold_log(folder, Recording.open(folder).events)  # fails while another recorder writes, whose transducer is left
+    fold_log(folder, Recording.open(folder).events)  # fails first while another recorder writes and holds the device
     recording = Recording.open(folder)
     resuming.check_resumable(recording)
     _folder_settings(folder, any_folder=ANY_FOLDER in _recorded_settings(recording))
@@ -142,7 +142,7 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> SessionSetup
     resumption, last = resuming.resumption(recording.plan, recording.events), recording.last_block()
     going_on, gap = resuming.continue_clock(recording, last, clock, datetime.now(UTC))
     people = _recorded_people(recording)
-    if request.people is not None:  # the bench holds the surfaces that it held
+    if request.people is not None:  # the bench keeps its surfaces
         people = replace(request.people, friction=people.friction)
     with _own_transducer(request, recording, bench) as info:
         _check_people(people, recording.plan, bench, folder)
@@ -156,7 +156,7 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> SessionSetup
 
 
 def run(prepared: SessionSetup, bench: Bench, display: Display, inbox: Inbox, send: Send) -> None:
-    """Run the session to its end, send all that happens, and seal it unless it can go on. Raises RecordingError."""
+    """Run the session to its end, report it, and seal it unless it can be resumed. Raises RecordingError."""
     writer = prepared.writer
     operator = _Operator(prepared, bench, display, inbox, send)
     writer.safe = operator.take_safe
@@ -175,11 +175,11 @@ def run(prepared: SessionSetup, bench: Bench, display: Display, inbox: Inbox, se
             progress=send,
         )
     resumable = end.cause in resuming.RESUMABLE
-    send(m.SessionEnded(str(writer.folder), end, resumable))  # which is another one where the first was taken away
+    send(m.SessionEnded(str(writer.folder), end, resumable))  # a new one if the first was removed
     if end.cause == "device":
         bench.lose(end.reason)
     if not resumable:
-        from sessions.recording.archive import seal  # HDF5 is slow to load, and nothing waits for it now
+        from sessions.recording.archive import seal  # HDF5 is slow to load, and nothing is waiting now
 
         send(m.Sealing(str(writer.folder)))
         seal(writer.folder)
@@ -201,7 +201,7 @@ def _recorded_people(recording: Recording) -> m.People:
 
 
 class _Operator:
-    """Client and simulated people as the runner's operator."""
+    """The runner's operator, made of the client and simulated people."""
 
     def __init__(self, prepared: SessionSetup, bench: Bench, display: Display, inbox: Inbox, send: Send) -> None:
         self._bench = bench
@@ -212,16 +212,16 @@ class _Operator:
         self._info = prepared.info
         self._helper = _helper(prepared, bench)
         self._touching = False
-        self._alone_ns: int | None = None  # when it was noticed that the client has gone
+        self._alone_ns: int | None = None  # when the client was noticed to be gone
 
     def show(self, command: Command) -> None:
-        """Send it on; whoever is simulated does it."""
+        """Send the command to the client and to simulated people."""
         self._send(command)
         if self._helper is not None:
             self._helper.show(command)
 
     def poll(self) -> Sequence[Event]:
-        """Return what was done; say no to what is not for now."""
+        """Return the new events; refuse requests that have to wait for the end of the session."""
         self._display.look(self._bench.health, streaming=self._info is not None)
         acts: list[Event] = []
         for request in self._inbox.take_requests():
@@ -229,7 +229,7 @@ class _Operator:
                 case m.AcknowledgeOverloads():
                     self._display.acknowledge()
                 case m.Stop() | m.Shutdown():
-                    pass  # `stop` sees them
+                    pass  # handled by `stop`
                 case m.Connect() | m.Disconnect() | m.Tare() | m.StartSession() | m.ResumeSession():
                     name = type(request).__name__
                     self._send(m.Failed(name, f"a session is running: {name} has to wait for its end"))
@@ -238,7 +238,7 @@ class _Operator:
         return acts if self._helper is None else (*acts, *self._helper.poll())
 
     def stop(self) -> Ending | None:
-        """Say why the session is to end now: somebody wants it, or the client is gone and no finger touches."""
+        """Return why the session must end now: a stop, or the client is gone and no finger touches; else None."""
         if self._inbox.stop_wanted.is_set():
             return "stopped", STOPPED_BY_USER
         if not self._inbox.client_gone.is_set():
@@ -250,7 +250,7 @@ class _Operator:
         return "client", CLIENT_GONE
 
     def take_safe(self, events: Sequence[LoggedEvent]) -> None:
-        """Send what became safe, and remember whether a finger touches."""
+        """Send the events now safe, and remember whether a finger touches."""
         for event in events:
             self._send(event)
             if event.kind in ("contact_onset", "finger_lifted", "take_discarded"):
@@ -273,7 +273,7 @@ def _helper(prepared: SessionSetup, bench: Bench) -> Operator | None:
 
 
 def _surface_of(people: m.People, plan: SessionPlan, folder: Path) -> SurfaceOf:
-    """Return a function from a trial to its simulated surface; where codes are blinded, by the study's key."""
+    """Return a function from a trial to its simulated surface, using the study's key if codes are blinded."""
     try:
         key = study_key(folder.parent) if plan.blinded else None
     except StudyError as error:
@@ -282,7 +282,7 @@ def _surface_of(people: m.People, plan: SessionPlan, folder: Path) -> SurfaceOf:
 
 
 def _check_people(people: m.People, plan: SessionPlan, bench: Bench, folder: Path) -> None:
-    """Raise NotNow where simulated people would have to stroke a real bench, or cannot tell stimuli apart."""
+    """Raise NotNow if simulated people would have to stroke a real bench, or cannot identify stimuli."""
     if people.kind != "people":
         _surface_of(people, plan, folder)
     simulated_bench = bench.connected is not None and bench.connected.bench is not None
@@ -293,7 +293,7 @@ def _check_people(people: m.People, plan: SessionPlan, bench: Bench, folder: Pat
 
 
 def _people_settings(people: m.People, uri: str | None) -> list[Setting]:
-    """Return what a resumption needs to know and nobody should have to say again."""
+    """Return the settings from which a resumption restores people and device."""
     settings = [Setting("people", people.kind, "", "set")]
     if people.kind != "people":
         settings.append(Setting("people seed", people.seed, "", "set"))
@@ -305,7 +305,7 @@ def _people_settings(people: m.People, uri: str | None) -> list[Setting]:
 
 
 def _folder_settings(folder: Path, *, any_folder: bool) -> list[Setting]:
-    """Return what is to be recorded of a folder that is not safe. Raises RecordingError unless any is allowed."""
+    """Return the setting that records an unsafe folder, if it is one. Raises RecordingError unless any is allowed."""
     sentence = unsafe(folder)
     if sentence is None:
         return []
@@ -316,7 +316,7 @@ def _folder_settings(folder: Path, *, any_folder: bool) -> list[Setting]:
 
 @contextmanager
 def _own_transducer(request: m.ResumeSession, recording: Recording, bench: Bench) -> Generator[TransducerInfo | None]:
-    """Have the transducer of the session open, and return who it is; None for a visit that only scores."""
+    """Hold the session's transducer open and yield its info; None for a visit that only scores."""
     if recording.info is None:
         if request.uri is not None:
             raise NotNow("the session began without a transducer, and goes on without one")
@@ -329,7 +329,7 @@ def _own_transducer(request: m.ResumeSession, recording: Recording, bench: Bench
 
 
 def _transducer_info(bench: Bench) -> TransducerInfo:
-    """Return who the transducer is, as it is written down."""
+    """Return the transducer's info in the form that is recorded."""
     assert bench.connected is not None
     info = bench.connected.transducer.info
     return replace(info, uri=without_home(info.uri))

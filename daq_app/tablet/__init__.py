@@ -1,1 +1,1 @@
-"""The subject's page on a tablet: what serves it, and what the tablet says."""
+"""The subject's page on a tablet: its server, and its messages."""

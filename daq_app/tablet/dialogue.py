@@ -1,4 +1,4 @@
-"""What the tablet and the program say to each other, which page it shows, and what becomes of its answers. No Qt."""
+"""Messages between the tablet and the program, the page shown, and the handling of its answers. No Qt."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -29,21 +29,21 @@ _WORDS = (  # of the page itself
 
 
 class Hello(Struct, frozen=True, tag="hello"):
-    """The first thing that a tablet says: by the code that somebody typed, or the token it got for that."""
+    """A tablet's first message, with the typed code, or with the token it got for that code."""
 
     code: Short = ""
     token: Short = ""
-    pixels_per_mm: PixelsPerMm | None = None  # CSS pixels; None: nobody held a ruler to it
+    pixels_per_mm: PixelsPerMm | None = None  # CSS pixels; None: not measured with a ruler
 
 
 class Ruler(Struct, frozen=True, tag="ruler"):
-    """Somebody held a ruler to the line."""
+    """The line was measured with a ruler."""
 
     pixels_per_mm: PixelsPerMm
 
 
 class Act(Struct, frozen=True, array_like=True):
-    """One thing that the subject did on the page."""
+    """One act of the subject on the page."""
 
     time: float  # clock of the tablet [ms]
     kind: Literal["press", "drag", "release", "step", "number", "choose"]
@@ -52,7 +52,7 @@ class Act(Struct, frozen=True, array_like=True):
 
 
 class AnswerGiven(Struct, frozen=True, tag="given"):
-    """An answer, sent again and again until it is stored."""
+    """An answer, sent repeatedly until it is stored."""
 
     key: Short  # of the question
     acts: tuple[Act, ...]
@@ -65,35 +65,35 @@ FromTablet = Hello | Ruler | AnswerGiven
 
 
 class Welcome(Struct, frozen=True, tag="welcome"):
-    """The tablet is the one that is let in; it comes back with the token."""
+    """The tablet is admitted; it reconnects with the token."""
 
     token: str
 
 
 class Refused(Struct, frozen=True, tag="refused"):
-    """The tablet is not let in."""
+    """The tablet is not admitted."""
 
     sentence: str
 
 
 class Page(Struct, frozen=True, tag="page"):
-    """What is to be shown."""
+    """The page to show."""
 
     view: SubjectView
-    key: str  # of the question; empty where none is asked
+    key: str  # of the question; empty if none is asked
     direction: Literal["ltr", "rtl"]
-    setting: bool  # no session runs: the tablet is being set up
+    setting: bool  # no session is running: the tablet is being set up
     words: dict[str, str]  # the page's own, in the subject's language
 
 
 class Stored(Struct, frozen=True, tag="stored"):
-    """The answer to a question is written down and safe, or nobody asks for it any more: it need not be sent again."""
+    """The answer to a question is stored, or no longer needed: the tablet stops sending it."""
 
     key: str
 
 
 class Force(Struct, frozen=True, tag="force"):
-    """How hard the finger presses."""
+    """The normal force of the finger."""
 
     part: float  # of the bar [-]
 
@@ -104,25 +104,25 @@ decode = msgspec.json.Decoder(FromTablet).decode  # raises msgspec.DecodeError f
 
 
 def encode(message: ToTablet) -> str:
-    """Return a message as it is sent."""
+    """Return a message as JSON text."""
     return msgspec.json.encode(message).decode()
 
 
 class Dialogue:
-    """Sends the subject's page, and hands each answer on once."""
+    """Sends the subject's page, and passes each answer on once."""
 
     def __init__(self, send: Callable[[ToTablet], None]) -> None:
-        """Begin; `send` takes what goes to the tablet."""
+        """Begin; `send` takes messages to the tablet."""
         self._send = send
         self._page: Page | None = None
         self._session: SessionState | None = None
-        self._open_keys: set[str] = set()  # keys of answers that were handed on and are not yet stored
+        self._open_keys: set[str] = set()  # keys of answers passed on and not yet stored
 
     def show(self, view: SubjectView, session: SessionState | None, translate: Translate, *, mirrored: bool) -> None:
-        """Show a page by `translate`, read from right to left where `mirrored`, and acknowledge answers now stored."""
+        """Show a page through `translate`, right to left if `mirrored`, and acknowledge answers now stored."""
         self._session = session
         if session is None or session.is_over:
-            self._open_keys.clear()  # what the recorder has not stored is sent again
+            self._open_keys.clear()  # answers not stored are sent again
         for key in tuple(self._open_keys):
             self._acknowledge(key)
         key = _key(session, *view.key) if view.asks and session is not None else ""
@@ -130,15 +130,15 @@ class Dialogue:
         page = Page(view, key, "rtl" if mirrored else "ltr", session is None, texts)
         if page != self._page:
             if self._page is not None and self._page.key != key:
-                self._open_keys.discard(key)  # asked once more: the recorder refused its answer, as in a pause
+                self._open_keys.discard(key)  # asked again: the recorder refused its answer, as in a pause
             self._page = page
             self._send(page)
 
     def take(self, answer: AnswerGiven, clock: Callable[[float], float]) -> Event | None:
-        """Return the recorder's command for an answer; None where it knows already, or no session runs.
+        """Return the recorder's event for an answer; None if it has that answer already, or no session is running.
 
-        `clock` makes of the tablet's clock [ms] the session's [s]. An answer no longer asked for is kept as a note.
-        In a pause none is taken, for the tablet sends it again when its question is asked once more.
+        `clock` converts the tablet's clock [ms] to the session's [s]. An answer no longer needed becomes a note.
+        In a pause none is taken, because the tablet sends it again when its question is repeated.
         """
         session, page, key = self._session, self._page, answer.key
         if session is None or session.is_over or page is None or key in self._open_keys or self._acknowledge(key):
@@ -153,7 +153,7 @@ class Dialogue:
         return Note(f"The tablet gave an answer that was no longer asked for ({key}): {structs.astuple(event)[0]}")
 
     def _acknowledge(self, key: str) -> bool:
-        """Tell the tablet that an answer is stored, where it is; return whether it is."""
+        """Confirm to the tablet an answer that is stored; return whether it is."""
         session = self._session
         if session is None:
             return False
@@ -166,7 +166,7 @@ class Dialogue:
 
 
 def event_of(acts: Sequence[Act], clock: Callable[[float], float], hand: Hand | None) -> AnswerEvent:
-    """Return the answer that the acts of a subject make."""
+    """Return the answer event made of a subject's acts."""
     line, choice = Answer(), Choice()
     for act in acts:
         time = clock(act.time)
@@ -184,10 +184,10 @@ def event_of(acts: Sequence[Act], clock: Callable[[float], float], hand: Hand | 
             case "choose", "first" | "second" as option:
                 choice = choice.choose(time, option, act.device)
             case _:
-                pass  # a value that does not go with its act
+                pass  # a value that does not match its act
     return choice.judgement(hand) if choice != Choice() else line.release().judgement(hand)
 
 
 def _key(session: SessionState, trial: int, take: int) -> str:
-    """Return the name of a question that no other question in any session has."""
+    """Return a name of a question that is unique over all sessions."""
     return f"{Path(session.folder).name}, trial {trial}, take {take}"

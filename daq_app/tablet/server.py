@@ -1,8 +1,8 @@
-"""Serves the subject's page to one tablet on the lab's own network, and nothing else to anybody.
+"""Serves the subject's page to one tablet on the lab's own network, and nothing else.
 
 There are two addresses: `/` is the page, which is the same for everybody and holds no data, and `/socket` is the
-conversation. Whoever talks there must first say the code that the experimenter's window shows. It holds for one
-device. After `TRIES` wrong codes there is a new one. What is said crosses the network as plain text.
+conversation. A client there must first send the code that the experimenter's window shows. The code admits one
+device. After `TRIES` wrong codes it is replaced. Messages cross the network as plain text.
 """
 
 import ipaddress
@@ -25,12 +25,12 @@ if TYPE_CHECKING:  # an optional package
     from websockets.http11 import Request, Response
     from websockets.sync.server import ServerConnection
 
-PORT = 8377  # where nothing else listens there; unassigned by IANA
-TRIES = 5  # of wrong codes, before there is a new one
+PORT = 8377  # unless it is taken; unassigned by IANA
+TRIES = 5  # wrong codes before the code is replaced
 WRONG_CODE = 1.0  # wait after a wrong code [s]: with 10^6 codes and `TRIES` a guess succeeds once in days
-ALIVE = 5.0  # a tablet that sends nothing for longer is gone [s]
+ALIVE = 5.0  # longest silence of a connected tablet [s]
 _PATIENCE = 10.0  # for the first message [s]
-REPLACED = 4000  # closes the conversation with a tab whose place another one of the same browser takes; see page.html
+REPLACED = 4000  # close code for a tab that another tab of the same browser replaces; see page.html
 OFF = logging.CRITICAL + 1
 _PAGE = Path(__file__).with_name("page.html")
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'"
@@ -42,14 +42,14 @@ class NoTabletServer(Exception):
 
 
 class TabletServer:
-    """A server in a thread of its own. All methods may be called from any thread."""
+    """A server in its own thread. All methods may be called from any thread."""
 
     def __init__(
         self, address: str, port: int, on_message: Callable[[FromTablet, float], None], on_change: Callable[[], None]
     ) -> None:
         """Listen at an address of this machine. Raises NoTabletServer.
 
-        `on_message` takes each message of the tablet that was let in, and its arrival by the monotonic clock [s].
+        `on_message` takes each message of the admitted tablet, and its arrival by the monotonic clock [s].
         `on_change` is called when a tablet comes or goes or the code changes. A free port replaces a taken one.
         """
         try:
@@ -60,11 +60,11 @@ class TabletServer:
         self._on_message = on_message
         self._on_change = on_change
         self._lock = threading.Lock()
-        self._door = threading.Lock()  # one guess at a time, however many ask at once
-        self._tablet: ServerConnection | None = None  # of the tablet that was let in
+        self._door = threading.Lock()  # one guess at a time over all connections
+        self._tablet: ServerConnection | None = None  # of the admitted tablet
         self._token = ""
         self._wrong = 0
-        self._last: dict[type, str] = {}  # what a tablet that comes back has to know
+        self._last: dict[type, str] = {}  # sent to a tablet that reconnects
         self.code = _new_code()
         listener = _listen(address, port)
         self.url = "http://{}:{}".format(*listener.getsockname()[:2])
@@ -78,35 +78,35 @@ class TabletServer:
             ping_interval=ALIVE / 2,
             ping_timeout=ALIVE / 2,
             compression=None,
-            logger=logging.Logger("tablet", OFF),  # a traceback is nothing for the terminal that opened the window
+            logger=logging.Logger("tablet", OFF),  # no tracebacks in the terminal that opened the window
         )
         threading.Thread(target=self._server.serve_forever, name="the tablet's server", daemon=True).start()
 
     @property
     def connected(self) -> bool:
-        """Say whether the tablet is there."""
+        """Say whether the tablet is connected."""
         return self._tablet is not None
 
     @property
     def code_is_used(self) -> bool:
-        """Say whether a tablet was let in by the code, which lets in no other."""
+        """Say whether the code has admitted a tablet; it admits only one."""
         return bool(self._token)
 
     @property
     def link(self) -> str:
-        """Return the address that holds the code too, behind a # that no browser sends."""
+        """Return the address with the code, after a # that browsers do not send."""
         return f"{self.url}/#{self.code}"
 
     def send(self, message: ToTablet) -> None:
-        """Send something to the tablet; a tablet that comes later gets the last message of each kind."""
+        """Send a message to the tablet; a tablet that connects later gets the last message of each kind."""
         text = encode(message)
-        with self._lock:  # so that a tablet that comes now does not hear of it too early
+        with self._lock:  # a tablet that is just connecting must not get it too early
             self._last[type(message)] = text
             if self._tablet is not None:
                 _send_text(self._tablet, text)
 
     def renew(self) -> None:
-        """Let go of the tablet, and let in whoever says the new code."""
+        """Disconnect the tablet, and admit the next one by a new code."""
         with self._lock:
             tablet, self._tablet, self._token = self._tablet, None, ""
             self.code, self._wrong = _new_code(), 0
@@ -115,11 +115,11 @@ class TabletServer:
         self._on_change()
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop listening."""
         self._server.shutdown()
 
     def _answer(self, connection: "ServerConnection", request: "Request") -> "Response | None":
-        """Answer a request for a page; None where it begins a conversation."""
+        """Return the response to a request for a page; None if it begins a conversation."""
         if request.path == "/socket":
             return None
         if request.path != "/":
@@ -132,7 +132,7 @@ class TabletServer:
         return page
 
     def _talk(self, connection: "ServerConnection") -> None:
-        """Let a tablet in, and take what it says until it goes."""
+        """Admit a tablet, and take its messages until it disconnects."""
         from websockets.exceptions import ConnectionClosed
 
         with suppress(ConnectionClosed, TimeoutError, msgspec.DecodeError):
@@ -151,7 +151,7 @@ class TabletServer:
                     self._on_change()
 
     def _let_in(self, connection: "ServerConnection", hello: Hello) -> bool:
-        """Say whether a tablet is the one; a tablet that comes back takes the place of its own lost connection."""
+        """Say whether a tablet is admitted; one that reconnects replaces its lost connection."""
         if self._admit(connection, hello.token, by_code=False):
             return True
         with self._door:
@@ -162,7 +162,7 @@ class TabletServer:
         return False
 
     def _admit(self, connection: "ServerConnection", secret: str, *, by_code: bool) -> bool:
-        """Let a tablet in that says the token, or the code while there is no token yet; return whether it did."""
+        """Admit a tablet by the token, or by the code while there is no token yet; return whether it is admitted."""
         with self._lock:
             right = self.code if by_code else self._token
             if by_code == bool(self._token) or not secrets.compare_digest(secret.encode(), right.encode()):
@@ -177,7 +177,7 @@ class TabletServer:
         return True
 
     def _refuse_code(self, hello: Hello) -> str:
-        """Return after a pause why a tablet is refused; after several wrong codes the code is replaced."""
+        """Return, after a pause, why a tablet is refused; replace the code after several wrong ones."""
         time.sleep(WRONG_CODE)
         with self._lock:
             in_use = bool(self._token)
@@ -193,17 +193,17 @@ class TabletServer:
 
 
 def own_address() -> str:
-    """Return this machine's network address, or its own loop; the system only looks up a route, no packet is sent."""
+    """Return this machine's network address, or loopback; the system only looks up a route and sends no packet."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.connect(("192.0.2.1", 9))  # documentation's own network (RFC 5737): no machine is there
+            probe.connect(("192.0.2.1", 9))  # network reserved for documentation (RFC 5737): has no machines
             return str(probe.getsockname()[0])
         except OSError:
             return "127.0.0.1"
 
 
 def _listen(address: str, port: int) -> socket.socket:
-    """Return a socket that listens at an address, at a free port where the one asked for is taken."""
+    """Return a socket that listens at an address, on a free port if the requested one is taken."""
     try:
         private = ipaddress.IPv4Address(address).is_private and address != "0.0.0.0"
     except ValueError as error:
@@ -226,7 +226,7 @@ def _new_code() -> str:
 
 
 def _send_text(connection: "ServerConnection", text: str) -> None:
-    """Send a text to a tablet; where it is gone, the thread that listens to it finds out."""
+    """Send a text to a tablet; if it is gone, its receiving thread notices."""
     from websockets.exceptions import ConnectionClosed
 
     with suppress(ConnectionClosed, OSError):
