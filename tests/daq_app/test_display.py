@@ -1,5 +1,6 @@
 """What the recorder sends while a transducer streams: how often, at what rate, and each reading once."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -8,9 +9,11 @@ import pytest
 from recordings import readings
 from stand_ins import CALIBRATION, INFO
 
-from daq_app.recorder.bench import Tap
+from daq_app.recorder.bench import Bench, Tap
 from daq_app.recorder.display import Display
-from daq_app.recorder.messages import HealthReport, Live
+from daq_app.recorder.messages import HealthReport, Live, Tared
+from drivers.clock import RealClock
+from drivers.readings import ReadingBlock
 from drivers.transducer import Health
 
 
@@ -99,3 +102,37 @@ def test_what_a_session_reads_is_shown_and_stamped_by_the_session_s_clock(monkey
     watched.display.look(Health())
     (live,) = watched.of(Live)
     assert (live.sequence.tolist(), live.received_ns.tolist()) == ([5, 6, 7], [1250] * 3)
+
+
+class LumpyTransducer:
+    """Gives readings at 128 Hz in lumps of forty, whose raw numbers alternate about (100, 200, ... 600)."""
+
+    info, health = INFO, Health()
+
+    def __init__(self):
+        self.begun, self.start, self.stop = 0, lambda: None, lambda: None
+
+    def read(self, _):
+        number = np.arange(self.begun, self.begun + 40)
+        self.begun += 40
+        raw = 100.0 * np.arange(1.0, 7.0) + np.where(number % 2, 1.0, -1.0)[:, None] * np.arange(6.0)
+        return ReadingBlock(number, number, 0 * number, number / 128.0, 0 * number, raw)
+
+
+def test_a_tare_takes_as_long_a_stretch_as_was_asked_for_and_tells_its_mean_and_noise(monkeypatch):
+    watched = Watched(monkeypatch)
+    connection = SimpleNamespace(transducer=LumpyTransducer(), frame=None)
+    monkeypatch.setattr("daq_app.recorder.bench.connect", lambda *_: nullcontext(connection))
+    bench = Bench(RealClock(), watched.display, watched.messages.append)
+    bench.connect("sim:")
+    bench.begin_tare(0.5)
+    bench.look()
+    assert watched.of(Tared) == []
+    bench.look()
+    (tared,) = watched.of(Tared)
+    lump = LumpyTransducer().read(0.0).raw
+    raw = np.vstack([lump, lump[:25]])  # 65 readings span half a second
+    assert (tared.readings, tared.duration) == (65, 0.5)
+    assert tared.mean == pytest.approx(raw.mean(axis=0))
+    assert tared.spread == pytest.approx(raw.std(axis=0, ddof=1))
+    assert tared.noise == pytest.approx(raw.std(axis=0, ddof=1) * np.array([1e-6] * 3 + [1e-3] * 3))

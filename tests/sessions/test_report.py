@@ -20,7 +20,7 @@ from sessions.recording import LoggedEvent, Recording, SessionWriter, provenance
 from sessions.recording.log import trial_records
 from sessions.report import Further, findings
 from sessions.report.contents import GroundTruth
-from sessions.report.facts import exclusion_sentences, remarks
+from sessions.report.facts import exclusion_sentences, people, remarks
 from sessions.report.figures.relation import relation_panel
 from sessions.report.pages import page
 from sessions.report.prose import summary
@@ -335,6 +335,26 @@ def test_what_became_of_each_trial_that_does_not_count_is_told():
         "Trial 3 has no answer: the subject did not answer.",
         "Trial 5 was not done: the session ended before.",
     )
+
+
+def test_who_took_part_and_what_of_the_finger_was_measured_is_told():
+    finger = replace(PLAN.finger, tip_radius=6.5, width=None)
+    plan = replace(PLAN, finger=finger, contact_angle=30.0, contact_angle_origin="measured", masking="pink noise")
+    tables = [SimpleNamespace(subject=subject, scores=scores) for subject, scores in (("S02", (1,)), ("S01", (2,)))]
+    facts = people(
+        SimpleNamespace(plan=plan, trials=()), [*tables, *tables[:1], SimpleNamespace(subject="S9", scores=())]
+    )
+    by_name = {fact.name: (fact.value, fact.remark) for fact in facts}
+    assert by_name["subject"][0] == "S01"
+    assert by_name["subjects who scored"] == ("2: S01, S02", "in 3 sessions")
+    assert by_name["protocol"][0] == "made-up"
+    assert by_name["stimulus order"] == ("shuffled", "seed 7")
+    assert by_name["stickiness"][0].endswith("; scale: 0 “not at all”, 100 “äußerst”.")
+    assert "Stimulus 20, stroked proximal to distal" in by_name["stickiness"][0]
+    assert by_name["the subject's finger: tip radius"] == ("6.5 mm", "measured")
+    assert "the subject's finger: width" not in by_name
+    assert by_name["contact angle"] == ("30°", "measured")
+    assert by_name["masking of sounds"][0] == "pink noise"
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=5000))
