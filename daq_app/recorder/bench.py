@@ -163,7 +163,7 @@ class Bench:
                 raise
 
     def lend(self, clock_offset_ns: int) -> Tap | None:
-        """Return the transducer, not streaming, for a session with its clock ahead by an offset; None if none is open."""
+        """Return the idle transducer for a session whose clock is ahead by an offset; None if none is open."""
         self.end_tare("a session began; zero again after it")
         if self.connected is None:
             return None
