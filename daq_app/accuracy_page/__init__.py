@@ -1,1 +1,1 @@
-"""What `daq-app accuracy` found, as a page with pictures and as tables in the docs."""
+"""The results of `daq-app accuracy`, as a page with pictures and as tables in the docs."""

@@ -1,4 +1,4 @@
-"""The pictures of the accuracy page, each with the numbers it shows."""
+"""The figures of the accuracy page, each with its numbers."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import cycle
@@ -65,7 +65,7 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
 
 
 def _curve(sheet: style.Sheet, kinematics: str, points: Sequence[tuple[float, float, bool, str, str]]) -> None:
-    """Draw times [ms] against errors [-], with a mark at each, hollow or not, and words around its numbers."""
+    """Draw times [ms] against errors [-], with a hollow or filled mark at each point and a caption of its numbers."""
     axes, colour = sheet.axes[0], _COLOURS[kinematics]
     axes.plot([100 * error for error, *_ in points], [span for _, span, *_ in points], color=colour, linewidth=0.8)
     for error, span, hollow, prefix, suffix in points:
@@ -237,7 +237,7 @@ CAPTIONS = {
 
 
 def plates(results: RunResults) -> dict[str, style.Plate]:
-    """Return the figures that there are numbers for, by name."""
+    """Return the figures that have data, by name."""
     speeds, guaranteed, orders = results.of(Speed), results.of(GuaranteedCost), results.of(Order)
     costs, growth = results.of(Cost), results.of(Growth)
     truths = [truth for truth in results.of(Truth) if truth.case in JUDGED and truth.doubt]
@@ -261,15 +261,15 @@ def plates(results: RunResults) -> dict[str, style.Plate]:
 
 
 def _logarithmic(axes: Axes) -> None:
-    """Make both axes logarithmic, from a power of ten to another, so that their labels are few and short."""
+    """Make both axes logarithmic, between powers of ten, so that labels are few and short."""
     axes.set(xscale="log", yscale="log")
     axes.set(xlim=_decades(axes.get_xlim()), ylim=_decades(axes.get_ylim()))
-    for axis in (axes.xaxis, axes.yaxis):  # powers of ten as plain numbers: read at a glance, and drawn twice as fast
+    for axis in (axes.xaxis, axes.yaxis):  # powers of ten as plain numbers: easier to read, and drawn twice as fast
         axis.set_major_formatter("{x:g}")
         axis.set_minor_formatter(NullFormatter())
 
 
 def _decades(limits: tuple[float, float]) -> tuple[float, float]:
-    """Return the powers of ten at or beyond both ends, but for a hair; never one twice."""
+    """Return the powers of ten around a range, with 12 % tolerance at each end; the two always differ."""
     low, high = np.floor(np.log10(limits[0]) + 0.05), np.ceil(np.log10(limits[1]) - 0.05)
     return float(10.0**low), float(10.0 ** max(high, low + 1.0))

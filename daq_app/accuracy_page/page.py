@@ -1,4 +1,4 @@
-"""The accuracy page, one self-contained HTML file, and its tables, which the docs have too."""
+"""The accuracy page, one self-contained HTML file, and its tables, which are also in the docs."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -52,7 +52,7 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
     def markdown(self) -> str:
-        """Return the table as it stands in the docs, where a cell has at most `CELL_WORDS` words."""
+        """Return the table in the form of the docs, where a cell has at most `CELL_WORDS` words."""
         lines = [self.header, tuple("---" for _ in self.header), *self.rows]
         return "\n".join("| " + " | ".join(_cell(text) for text in line) + " |" for line in lines)
 
@@ -69,7 +69,7 @@ def _table_maker(
     columns: Mapping[str, Callable[[R], str]],
     order: Callable[[R], tuple[bool, int]] = lambda _: (False, 0),
 ) -> Callable[[RunResults], Table]:
-    """Return the function that makes a table with a line for each row of a kind, each cell made by its column."""
+    """Return a function that makes a table with a line for each row of a type, each cell computed by its column."""
 
     def table(results: RunResults) -> Table:
         rows = sorted(results.of(row_type), key=order)
@@ -96,7 +96,7 @@ def _machine(results: RunResults) -> Table:
 
 
 def _estimates(results: RunResults) -> Table:
-    """Return how often estimates are above and near, by kinematics and number."""
+    """Return the shares of estimates that are above and near the true error, by kinematics and number."""
     rows = results.of(Estimate)
     cells: list[tuple[str, ...]] = []
     for kinematics, name in product(dict.fromkeys(row.kinematics for row in rows), GOALS):
@@ -249,14 +249,14 @@ _TABLES: tuple[Callable[[RunResults], Table], ...] = (
 
 
 def tables(results: RunResults) -> dict[str, Table]:
-    """Return the tables that there are rows for, by name."""
+    """Return the tables that have rows, by name."""
     return {table.name: table for table in (make(results) for make in _TABLES) if table.rows}
 
 
 def filled_pages(docs: Path, tables: Mapping[str, Table]) -> dict[Path, str]:
-    """Return the text of the pages below `docs` with the tables of one run, and of no other, by file.
+    """Return the text of the pages below `docs`, by file, with the tables of this run only.
 
-    A table that the run has no rows for is said to be missing. Raises OSError, and ValueError for a page without marks.
+    A table without rows in the run is marked as missing. Raises OSError, and ValueError for a page without marks.
     """
     texts: dict[Path, str] = {}
     for page, names in PAGES.items():
@@ -269,7 +269,7 @@ def filled_pages(docs: Path, tables: Mapping[str, Table]) -> dict[Path, str]:
 
 
 PAGE, DATA, FIGURES = "accuracy.html", "accuracy.json", "figures"
-# anchor, words, and the figures and tables under them, by name
+# anchor, words, and the names of the figures and tables below them
 SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("asked", "Targets of speed", ("targets",)),
     ("time", "Time against true error", ("speed", "speeds", "benchmarks")),
@@ -285,7 +285,7 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
 
 
 def page(results: RunResults, figures: Mapping[str, Plate] | None = None) -> str:
-    """Return the page: no script, nothing asked of any network; `figures` where they are drawn already."""
+    """Return the page, without scripts or network access; pass `figures` if they are already drawn."""
     figures, by_name = plates(results) if figures is None else figures, tables(results)
     sections = [section for section in SECTIONS if any(item in figures or item in by_name for item in section[2])]
     return template("accuracy.html.jinja", "daq_app.accuracy_page").render(
@@ -301,7 +301,7 @@ def page(results: RunResults, figures: Mapping[str, Plate] | None = None) -> str
 
 
 def write(results: RunResults, folder: Path) -> tuple[Path, ...]:
-    """Write page, pictures and data to `folder`; return the files. Raises ReportError where that cannot be done."""
+    """Write page, pictures and data to `folder`; return the files. Raises ReportError if that fails."""
     data = folder / DATA
     swap_in(data, json.dumps(results.to_dict(), indent=1, allow_nan=False) + "\n")
     paths = [data]

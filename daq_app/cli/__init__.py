@@ -1,1 +1,1 @@
-"""The command line: verbs, options, and what they say to people and scripts."""
+"""The command line: verbs, options, and their output for people and scripts."""

@@ -23,7 +23,7 @@ from daq_app.console import (
 _HELP = frozenset({"-h", "--help"})
 _LONGEST = 1500  # of the sentence of a failure [characters]: half a page of a terminal
 
-# Verb to module and to what it does. A verb's module is imported only when it is the one asked for.
+# Verb to its one-line help. A verb's module is imported only when it is run.
 VERBS = {
     "demo": "run the whole study on the simulated transducer and simulated subjects",
     "devices": "list the transducers that can be reached, or probe one",
@@ -50,7 +50,7 @@ VERBS = {
 }
 
 
-# Failures that come of the command line or of a value in a file; every other exception of our own could not be done.
+# Errors of the command line or of a value in a file (exit code 2); other exceptions of the program have exit code 1.
 _WRONG = (
     "daq_app.console.WrongValue",
     "drivers.address.AddressError",
@@ -70,8 +70,8 @@ def run(arguments: list[str]) -> int:
     except KeyboardInterrupt as stop:
         return _report(str(stop) or "stopped", FLAWED if isinstance(stop, RecordingKept) else STOPPED)
     except BrokenPipeError:
-        return FAILED  # whoever read our output has gone; there is nobody to tell
-    except Exception as error:  # noqa: BLE001  the last resort: no traceback reaches a user
+        return FAILED  # the reader of our output has gone
+    except Exception as error:  # noqa: BLE001  no traceback may reach a user
         if debug:
             traceback.print_exc()
         return _report(*_failure(error))
@@ -86,7 +86,7 @@ def _dispatch(arguments: list[str]) -> int:
         _overview().print_help()
         return DONE
     if name == "--version":
-        from sessions.recording.head import software_versions  # here: no verb needs it this early
+        from sessions.recording.head import software_versions  # here, because no verb needs it earlier
 
         print("daq-app", software_versions()["daq-app"])
         return DONE
@@ -135,7 +135,7 @@ def verb_module(name: str) -> ModuleType:
 
 
 def parser_of(name: str, verb: ModuleType) -> argparse.ArgumentParser:
-    """Return what reads the command line of a verb."""
+    """Return the parser of a verb's command line."""
     parser = Parser(
         prog=f"daq-app {name}",
         description=verb.__doc__,
@@ -150,17 +150,17 @@ def parser_of(name: str, verb: ModuleType) -> argparse.ArgumentParser:
 
 def _failure(error: Exception) -> tuple[str, int]:
     sentence = " ".join(str(error).split())
-    if len(sentence) > _LONGEST:  # a damaged file put the middle into it
+    if len(sentence) > _LONGEST:  # the middle comes from a damaged file
         sentence = f"{sentence[: _LONGEST // 2]} … {sentence[-_LONGEST // 2 :]}"
     if any(f"{base.__module__}.{base.__qualname__}" in _WRONG for base in type(error).__mro__):
         return sentence, WRONG
     if sentence and is_ours(error):
         return sentence, FAILED
     if isinstance(error, OSError):
-        from sessions.file_access import failure_sentence  # here: a verb that is well needs none
+        from sessions.file_access import failure_sentence  # here, because only a failing verb needs it
 
         return sentence if error.filename is None else failure_sentence(error), FAILED
-    if isinstance(error, UnicodeEncodeError):  # Python has bytes of a name that are no UTF-8 as lone surrogates
+    if isinstance(error, UnicodeEncodeError):  # Python holds non-UTF-8 bytes of a name as lone surrogates
         around = error.object[max(error.start - 40, 0) : error.end + 20]
         return f"a name is not UTF-8 ({around!r}): rename the file or folder and run this again", FAILED
     if isinstance(error, ModuleNotFoundError) and error.name and error.name.partition(".")[0] not in OUR_OWN:

@@ -1,4 +1,4 @@
-"""Options that several verbs share, those about a session, and how a value that somebody typed is checked."""
+"""Options shared by several verbs, options about a session, and checks of typed values."""
 
 import argparse
 import math
@@ -15,15 +15,15 @@ from sessions.plan.protocols.protocol import LARGEST_SEED as LARGEST
 from sessions.strokes.stroke import FIXED, HERTZ_EXPONENT, PLANNED_AT, AreaLaw
 from solver.quantities import NAMES, SED
 
-LARGEST_STUDY_SEED = 10_000_000  # of a study of simulated people, each of whom has a seed a hundred times as large
+LARGEST_STUDY_SEED = 10_000_000  # of a study of simulated people, whose own seeds are a hundred times as large
 
 
 def number_in_range(
     name: str, number_type: type[int] | type[float], least: float, greatest: float, allowed: str = "", per: int = 1
 ) -> Callable[[str], float]:
-    """Return the `type` of an option for argparse: a number that raises WrongValue where it is not allowed.
+    """Return an argparse `type` for numbers in a range, which raises WrongValue for any other.
 
-    `allowed` say what is allowed where the least and the greatest value do not. What is typed is `per` times the value.
+    `allowed` describes the range where `least` and `greatest` do not. The typed number is `per` times the value.
     """
     limits = f"{least:g} on" if math.isinf(greatest) else f"{least:.12g} to {greatest:.12g}"
     usual = f"a whole number from {limits}" if number_type is int else limits
@@ -51,7 +51,7 @@ def add_number(
     metavar: str | None = None,
     allowed: str = "",
 ) -> None:
-    """Declare an option that takes a number in a span; `allowed` say which where the ends do not."""
+    """Declare an option that takes a number in a span; `allowed` describes the span where its ends do not."""
     parse = number_in_range(name, number_type, *span, allowed)
     parser.add_argument(name, type=parse, default=default, metavar=metavar, help=meaning)
 
@@ -64,12 +64,12 @@ def add_flag(parser: argparse.ArgumentParser, name: str, meaning: str) -> None:
 def add_seed(
     parser: argparse.ArgumentParser, use: str, default: int | None = 0, largest: float = LARGEST_STUDY_SEED
 ) -> None:
-    """Declare --seed, of something that is drawn at random."""
+    """Declare --seed for a random draw."""
     add_number(parser, "--seed", int, (0, largest), use, default)
 
 
 def numbers_by_key(texts: Sequence[str], option: str, example: str) -> dict[str, float]:
-    """Return the numbers of an option given as NAME=VALUE, by name. Raises WrongValue with the example."""
+    """Return the numbers of a NAME=VALUE option, by name. Raises WrongValue with the example."""
     numbers: dict[str, float] = {}
     for text in texts:
         key, _, value = (piece.strip() for piece in text.partition("="))
@@ -86,12 +86,12 @@ def numbers_by_key(texts: Sequence[str], option: str, example: str) -> dict[str,
 
 
 def add_session(parser: argparse.ArgumentParser) -> None:
-    """Declare the session's folder."""
+    """Declare the argument for a session's folder."""
     parser.add_argument("session", type=Path, metavar="SESSION", help="a session folder")
 
 
 def add_visit(parser: argparse.ArgumentParser, further: str = "") -> None:
-    """Declare a session's folder or a study's, of which --subject chooses a visit; `further` adds to what that does."""
+    """Declare a folder of a session or of a study, and --subject, which chooses a visit; `further` extends its help."""
     parser.add_argument("session", type=Path, metavar="SESSION|STUDY", help="the folder of a session or of a study")
     parser.add_argument("--subject", metavar="CODE", help=f"of a study: whose visit with forces{further}")
 
@@ -104,7 +104,7 @@ def _address(text: str) -> str:
 
 _STRAINS = ["small", "finite"]
 _HEIGHTS = f"{HEIGHTS[0]:g} to {HEIGHTS[1]:g} (mm)"
-# Options that more than one verb declares. {} stands for what a verb says of them, which is all where no help is here.
+# Options of several verbs. {} stands for the verb's own words, which are the whole help where none is given here.
 _SHARED: Mapping[str, dict[str, Any]] = {
     "quantity": {
         "choices": NAMES, "default": SED.name, "metavar": "NAME",
@@ -126,11 +126,11 @@ _SHARED: Mapping[str, dict[str, Any]] = {
         "help": "of a Dask cluster you trust, such as tls://host:8786, in place of this computer",
     },
 }  # fmt: skip
-_BEFORE = {"variants": ["--beside"]}  # what an option was called before
+_BEFORE = {"variants": ["--beside"]}  # former names of options
 
 
 def add_shared(parser: argparse.ArgumentParser, *names: str, **uses: str) -> None:
-    """Declare options that several verbs have; `uses` say what some of them mean in this one."""
+    """Declare options that several verbs have; `uses` give the meaning of some of them in this verb."""
     for name in (*names, *uses):
         options = [f"--{name.replace('_', '-')}", *_BEFORE.get(name, ())]
         settings: dict[str, Any] = {"help": "{}"} | _SHARED[name]
@@ -142,7 +142,7 @@ _FINGER = ("tip_radius", "width", "contact_angle")
 
 
 def add_body_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the subject's own finger and depths."""
+    """Declare --finger and --depth, the subject's own finger and depths."""
     meaning = "as measured on the subject: tip_radius [mm], width of the contact [mm], contact_angle [degrees]"
     parser.add_argument("--finger", nargs="+", default=[], metavar="NAME=VALUE", help=meaning)
     meaning = "the subject's own, in place of a block's"
@@ -150,7 +150,7 @@ def add_body_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def body_of(options: argparse.Namespace) -> Body:
-    """Return what the options state. Raises WrongValue."""
+    """Return the subject's own finger and depths. Raises WrongValue."""
     finger = numbers_by_key(options.finger, "--finger", "tip_radius=6.5")
     for key in finger:
         if key not in _FINGER:
@@ -163,7 +163,7 @@ def body_of(options: argparse.Namespace) -> Body:
 
 
 def measures_sentence(plan: SessionPlan) -> str | None:
-    """Return what is the subject's own in a plan, for whoever runs the session; None where nothing is."""
+    """Return a sentence on the subject's own values in a plan, for the experimenter; None if there are none."""
     lengths = {"tip radius": plan.finger.tip_radius, "width": plan.finger.width}
     facts = [f"{name} {length:g} mm" for name, length in lengths.items() if length is not None]
     if plan.contact_angle_origin == "measured":
@@ -177,7 +177,7 @@ AS_BEFORE = "as the session was analysed before, or else fixed"
 
 
 def add_analysis(parser: argparse.ArgumentParser, otherwise: str = AS_BEFORE) -> None:
-    """Declare --area, --area-force and --calibration-error; `otherwise` says which area holds without."""
+    """Declare --area, --area-force and --calibration-error; `otherwise` names the default area."""
     meaning = "contact area for tau_max: fixed (the plan's), hertz (grows as N^(2/3)), or an exponent of N; where none"
     parser.add_argument("--area", metavar="LAW", help=f"{meaning} is given {otherwise}")
     meaning = f"normal force at which an area that grows is the plan's ({PLANNED_AT:g}, assumed)"
@@ -186,14 +186,14 @@ def add_analysis(parser: argparse.ArgumentParser, otherwise: str = AS_BEFORE) ->
 
 
 def add_calibration(parser: argparse.ArgumentParser) -> None:
-    """Declare --calibration-error, typed in per cent: the standard uncertainty of each axis' gain [-]."""
+    """Declare --calibration-error, the standard uncertainty of each axis's gain [-], typed in per cent."""
     meaning = "standard uncertainty of each axis of the transducer (else as set before for the session, or 1, assumed)"
     parse = number_in_range("--calibration-error", float, 0.0, 20.0, "0 to 20 (per cent)", per=100)
     parser.add_argument("--calibration-error", type=parse, metavar="PERCENT", help=meaning)
 
 
 def area_law(options: argparse.Namespace) -> AreaLaw | None:
-    """Return the law that the options state, None where they state none. Raises WrongValue."""
+    """Return the area law of the options, None if they give none. Raises WrongValue."""
     if options.area is None and options.area_force is None:
         return None
     if options.area in ("fixed", None):

@@ -1,4 +1,4 @@
-"""Tables of a report as text, for a terminal."""
+"""A report's tables as text for a terminal."""
 
 from daq_app.console import table
 from sessions.report.contents import Report
@@ -13,7 +13,7 @@ def table_texts(report: Report, *sections: str) -> list[str]:
 
 
 def _as_text(report_table: Table) -> str:
-    """Return a table with its caption, each number over its interval, and the notes that its marks stand for."""
+    """Return a table with its caption, each number above its interval, and the notes of its marks."""
     header = [
         f"{column.name} [{column.unit}]" if column.unit.strip("1") else column.name for column in report_table.columns
     ]

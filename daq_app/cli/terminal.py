@@ -1,4 +1,4 @@
-"""A session that the recorder runs, attended from a terminal: prompts on stderr, answers from stdin."""
+"""A terminal that attends a session of the recorder: prompts on stderr, answers from stdin."""
 
 import sys
 import threading
@@ -31,7 +31,7 @@ _WAYS = {1: "from proximal to distal (away from the subject)", -1: "from distal 
 
 @dataclass(frozen=True, slots=True)
 class Prompt:
-    """What a command asks for, and what is meant by Enter alone and by a number (None: no answer)."""
+    """The text of a prompt, and the events of Enter alone and of a number (None: no answer)."""
 
     question: str
     enter: steps.Event | None = None
@@ -39,22 +39,22 @@ class Prompt:
 
 
 class Terminal:
-    """Reads lines in a thread of its own, so that nobody's slowness holds up the recording."""
+    """Reads lines in a separate thread, so that slow typing does not hold up the recording."""
 
     def __init__(self, console: Console, *, forces: bool, lines: TextIO | None = None) -> None:
-        """Talk on stderr and listen on stdin; `forces` is False where no transducer shows when a stroke is done."""
+        """Write to stderr and read stdin; `forces` is False if no transducer detects the end of a stroke."""
         self._forces = forces
         self._print = console.note
         self._prompt: Prompt | None = None
         self._paused = False
         self._lines: deque[str] = deque()
-        self.closed = False  # nobody can type any more
+        self.closed = False  # stdin has ended
         # A daemon: a blocked read of stdin must not keep the program alive.
         threading.Thread(target=self._read, args=(lines or sys.stdin,), daemon=True).start()
         self._print(_HELP)
 
     def show(self, command: steps.Command) -> None:
-        """Print what is to be done, and remember what was asked."""
+        """Print the instruction of a command, and remember its question."""
         prompt = self._prompt_of(command)
         if prompt is not None:
             self._prompt = prompt
@@ -71,7 +71,7 @@ class Terminal:
                 self._print(f"The session ends: {reason}.")
 
     def follow(self, state: str) -> None:
-        """Say that the session is paused, once it is."""
+        """Announce a pause once when it begins."""
         was_paused, self._paused = self._paused, state == "paused"
         if self._paused and not was_paused:
             self._print(PAUSED)
@@ -110,7 +110,7 @@ class Terminal:
                 return None
 
     def poll(self) -> tuple[steps.Event, ...]:
-        """Return what the lines typed since the last call mean."""
+        """Return the events of the lines typed since the last call."""
         events = [self._parse(self._lines.popleft().strip()) for _ in range(len(self._lines))]
         return tuple(event for event in events if event is not None)
 
@@ -125,7 +125,7 @@ class Terminal:
             "pause": steps.Pause(),
             "resume": steps.Resume(),
         }
-        if word == "abort" and not text.strip():  # it seals the session, and nothing goes on after that
+        if word == "abort" and not text.strip():  # it seals the session for good
             self._print("say why: abort needs a reason")
             return None
         if word in orders:
@@ -149,34 +149,34 @@ class Terminal:
 
 
 def _choice(number: float | None) -> steps.Event | None:
-    """Return the choice of 1, 2 or neither; None for any other number."""
+    """Return the event of choice 1, choice 2 or no answer (None); None for any other number."""
     if number is not None and number not in _CHOICES:
         return None
     return steps.PairedChoice(None if number is None else _CHOICES[number], input_device=KEYBOARD)
 
 
-SILENCE = 3.0  # after which a recorder that should answer ten times a second is wondered about [s]
-_LOOK = 0.02  # between two looks at recorder, terminal and Ctrl-C [s]
-_WRONG = frozenset({"AddressError", "NotNow"})  # failures that come of the command line
+SILENCE = 3.0  # without a report from the recorder, before the terminal says so [s]
+_LOOK = 0.02  # between two polls of recorder, terminal and Ctrl-C [s]
+_WRONG = frozenset({"AddressError", "NotNow"})  # failures that are errors of the command line
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a session came out."""
+    """The outcome of a session."""
 
-    folder: str  # where it lies: another folder than asked for where that was taken away meanwhile
+    folder: str  # its final folder; not the requested one if that was removed during the session
     end: SessionEnd
     sealed: bool
 
     @property
     def exit_code(self) -> int:
-        """Return DONE for a session with every trial and no flaw of its transducer, else FLAWED."""
+        """Return DONE for a complete session without transducer flaws, else FLAWED."""
         health = self.end.health
         return DONE if self.end.complete and not (health.lost or health.doubtful or health.off_units) else FLAWED
 
 
 def open_device(recorder: Recorder, uri: str) -> m.Device:
-    """Have the recorder open a transducer. Raises as the driver does, KeyboardInterrupt when somebody stops it."""
+    """Have the recorder open a transducer. Raises as the driver does, and KeyboardInterrupt on a stop."""
     with interruptions() as interrupted:
         recorder.send(m.Connect(uri))
         while True:
@@ -190,9 +190,9 @@ def open_device(recorder: Recorder, uri: str) -> m.Device:
 
 
 def attend_session(recorder: Recorder, request: m.StartSession | m.ResumeSession, console: Console) -> Outcome:
-    """Attend a session until it is sealed, or cut short; people answer at this terminal unless they are simulated.
+    """Attend a session until it is sealed or cut short; people answer at this terminal unless they are simulated.
 
-    A stop is passed on at once; a second one no longer waits: for the sealing, which the recorder finishes alone, or
+    A stop is passed on immediately. A second one ends the wait for the sealing, which the recorder finishes alone, or
     for a recorder that does not answer (RecordingKept). Raises as a driver does, RecordingError, WrongValue.
     """
     recorder.send(request)
@@ -242,8 +242,8 @@ class _Attendance:
         )
 
     def _watch_silence(self) -> None:
-        """Say so once where the recorder does not answer, and once when it does again."""
-        running = self._start is not None and self._end is None  # it reports nothing while it starts or seals
+        """Report once when the recorder stops answering, and once when it answers again."""
+        running = self._start is not None and self._end is None  # it is silent while it starts or seals
         silent = running and self._recorder.silence > SILENCE
         if silent != self._silent:
             self._silent = silent
@@ -254,7 +254,7 @@ class _Attendance:
             )
 
     def _take(self, report: m.Report) -> Outcome | None:
-        """Take a report, and return the outcome when it is the last."""
+        """Take a report, and return the outcome if it is the last one."""
         match report:
             case m.SessionBegun():
                 self._start = report
@@ -271,9 +271,9 @@ class _Attendance:
                 assert self._end is not None
                 return Outcome(self._end.folder, self._end.end, sealed=True)
             case m.LinkDown(sentence) if self._start is None:
-                raise LinkLost(sentence)  # it was opened, and does not stream
+                raise LinkLost(sentence)  # it opened but does not stream
             case m.Failed() if self._stopping and self._start is None:
-                raise KeyboardInterrupt  # as wanted, before anything was recorded
+                raise KeyboardInterrupt  # as requested, before anything was recorded
             case m.Failed() | m.Gone():
                 _raise_failure(report)
             case _ if isinstance(report, Command) and self._terminal is not None:

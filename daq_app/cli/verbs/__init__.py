@@ -1,1 +1,1 @@
-"""One module a verb: its arguments, and what it does."""
+"""One module per verb: its arguments and its action."""

@@ -33,7 +33,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from sessions.report.pages import make_place
 
     console.progress(0.0, "loading")
-    make_place(options.out)  # said before three minutes are spent
+    make_place(options.out)  # fails before three minutes are spent
     _docs(options, {})
     results = _measure_or_restore(options, console)
     if results.stopped:
@@ -56,7 +56,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _docs(options: argparse.Namespace, page_tables: "Mapping[str, Table]") -> dict[Path, str]:
-    """Return the pages of the docs with these tables, by file. Raises OSError and WrongValue for other folders."""
+    """Return the text of the docs pages with these tables, by file. Raises OSError and WrongValue for other folders."""
     from daq_app.accuracy_page.page import filled_pages
 
     if options.docs is None:
@@ -68,7 +68,7 @@ def _docs(options: argparse.Namespace, page_tables: "Mapping[str, Table]") -> di
 
 
 def _measure_or_restore(options: argparse.Namespace, console: Console) -> "RunResults":
-    """Measure, or return the results of an earlier run. Raises WrongValue for a file that holds none."""
+    """Return new measurements, or the results of an earlier run. Raises WrongValue for a file without any."""
     from sessions.file_access import json_object, name_failure, read_within_limit
     from sessions.recording.head import software_versions
     from solver.verification.measuring import measure, restore

@@ -44,7 +44,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _print(recording: Recording, analysis: Analysis, console: Console) -> None:
-    """Print when each stroke was, and the report's own tables of what it is."""
+    """Print the times of each stroke, and the report's tables of its numbers."""
     from daq_app.cli.report_tables import table_texts  # slow to load
     from sessions.report import Further, numbers_alone
 

@@ -63,7 +63,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.choose and options.trial is None:
         raise WrongValue("--choose is of a trial, whose stroke --stroke names: give --trial N")
     document = stored_document(recording.folder, ANALYSIS)
-    gain_error_set(recording.folder)  # where it is damaged nothing is recorded that could not be analysed then
+    gain_error_set(recording.folder)  # raises if damaged, before a decision is recorded that could not be analysed
     analysis = analyse(recording, settings_of(document or {}), decisions)
     decision = _decision(options) if options.tilt is None else _tilt(options, analysis)
     decision = with_present(analysis, decision)
@@ -95,7 +95,7 @@ def _decision(options: argparse.Namespace) -> Decision:
 
 
 def _tilt(options: argparse.Namespace, analysis: Analysis) -> Decision:
-    """Return the decision to level the face, by the angles given or by those that its presses tell."""
+    """Return the decision to level the face, by given angles or by those estimated from presses."""
     angles: list[float] = options.tilt
     if len(angles) not in (0, 2):
         raise WrongValue("--tilt takes two angles, to +x and to +y in degrees, or none")

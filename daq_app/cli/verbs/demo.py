@@ -23,7 +23,7 @@ from sessions.statistics.scores import mean_scores
 from sessions.strokes import Analysis
 
 EXAMPLE = "daq-app demo --seed 7"
-_PACE = 20.0  # simulated seconds a real second
+_PACE = 20.0  # simulated seconds per real second
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,7 +50,7 @@ def _demonstrate(options: argparse.Namespace, results: Path, console: Console) -
     recording = Recording.open(study.forces)
     analysis = analyse_session(recording, console)
     prediction = predict_session(recording, analysis, console, PredictionOptions(intervals=True, variants="small"))
-    # Imported here: drawing is slow to load, and the session is on the disk by now.
+    # Imported here: drawing is slow to load, and the session is already on the disk.
     from sessions.report import findings
     from sessions.report.pages import plates, write_figures, write_report
     from sessions.statistics.scores import score_table

@@ -132,7 +132,7 @@ def _listen(transducer: Transducer, clock: Clock, console: Console) -> ReadingBl
 
 
 def _measured_rate(readings: ReadingBlock) -> float | None:
-    """Return readings a second by regression of arrival on sequence [Hz]."""
+    """Return the rate [Hz] by regression of arrival on sequence, None if it cannot be fitted."""
     if len(readings) < 10:
         return None
     numbers, arrivals = readings.sequence - readings.sequence[0], readings.received_ns - readings.received_ns[0]

@@ -70,7 +70,7 @@ def _refuse_mixtures(options: argparse.Namespace) -> None:
 
 
 def _write_labels(folder: Path, path: Path) -> None:
-    """Write the code of each stimulus to a file, and that it was written into the study."""
+    """Write the code of each stimulus to a file, and record in the study that it was written."""
     key, study = studies.study_key(folder), studies.open_study(folder)
     labels = study.protocol.labels if key is None else key.labels
     lines = [f"{descriptor} {index}: {code}" for (descriptor, index), code in labels.items()]

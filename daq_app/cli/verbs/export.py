@@ -42,7 +42,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _source(recording: Recording, console: Console) -> ExportSource:
-    """Return the session with the numbers kept in it; those made under other decisions are made again."""
+    """Return the session with its stored numbers; those made under other decisions are computed again."""
     decisions = read(recording.folder)
     made_by = {"made_by": software_versions()}
     analysis, prediction = (derived.stored_document(recording.folder, name) for name in (ANALYSIS, PREDICTION))

@@ -33,11 +33,11 @@ from sessions.toml_file import toml_text
 from solver import Scene
 
 EXAMPLE = "daq-app fit-finger recordings/P07 --displacement stage.csv --scene P07-finger.toml"
-SCENE_HEAD = "# A finger found by 'daq-app fit-finger'"  # at the head of its scene file
-_MU, FACTOR = 0.5, 2.0  # usual ones
-DEEPER = 1.1  # depth of the model by that of the stage, should contact begin before its onset is detected [-]
-FALL = 0.05  # relative fall of the force in a hold from which relaxation is named [-]
-AGREE = 0.02  # relative difference of the solver's forces from the fitted ones from which there is a flaw [-]
+SCENE_HEAD = "# A finger found by 'daq-app fit-finger'"  # first line of the scene file
+_MU, FACTOR = 0.5, 2.0  # defaults of --mu and --prior
+DEEPER = 1.1  # greatest depth of the model by the stage's, as contact may begin before the detected onset [-]
+FALL = 0.05  # relative fall of the force in a hold above which relaxation is reported [-]
+AGREE = 0.02  # relative difference of the solver's forces from the fitted ones above which there is a flaw [-]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -104,12 +104,12 @@ class _Outcome(NamedTuple):
 
     @property
     def scene(self) -> Scene:
-        """The finger found."""
+        """Return the scene with the estimated finger."""
         return self.fit.scene if self.relaxation is None else self.relaxation.relaxing(self.fit.scene)
 
 
 def _curves(options: argparse.Namespace, recording: Recording, settings: AnalysisSettings) -> PressCurves:
-    """Return the presses that the log follows. Raises FitError where there is none, ImportRefused."""
+    """Return the presses that the log covers. Raises FitError if there are none, and ImportRefused."""
     log = displacement_log(options.displacement)
     if options.shift and log.clock == "sequence":
         raise WrongValue("--shift is of times, and the log counts readings: leave it out")
@@ -125,7 +125,7 @@ def _curves(options: argparse.Namespace, recording: Recording, settings: Analysi
 
 
 def _relaxation_flaws(curves: PressCurves) -> list[str]:
-    """Say where the finger relaxes in a hold, which bends its force over depth."""
+    """Return a flaw for relaxation in a hold, which distorts the curve of force over depth."""
     fall = max((hold.fall for hold in curves.holds if hold is not None), default=0.0)
     if fall <= FALL:
         return []
@@ -138,7 +138,7 @@ def _relaxation_flaws(curves: PressCurves) -> list[str]:
 def _fit(
     options: argparse.Namespace, plan: SessionPlan, curves: PressCurves, gain_error: float, console: Console
 ) -> _Outcome:
-    """Return the fit of presses, and what the solver itself says of its finger. Raises FitError."""
+    """Return the fit to the presses, and the solver's check of the fitted finger. Raises FitError."""
     holds = [(press, hold) for press, hold in zip(curves.presses, curves.holds, strict=True) if hold is not None]
     if options.relaxation and not holds:
         raise FitError("No press is held: let the stage stand for half a second or more, or leave --relaxation out.")
@@ -196,6 +196,6 @@ def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> 
 
 
 def _interval_text(interval: Interval, unit: float = 1e-3) -> str:
-    """Return an interval in a unit, kPa for stiffness."""
+    """Return an interval as text in a unit, by default MPa shown in kPa."""
     low, high = ("open" if limit is None else number(limit / unit) for limit in (interval.low, interval.high))
     return f"{low} to {high}"

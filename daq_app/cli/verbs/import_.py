@@ -46,7 +46,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 @contextmanager
 def _whole_session(folder: Path) -> Generator[None]:
-    """Leave a whole session or nothing; where the disk is full, the error says that nothing can be resumed."""
+    """Leave a complete session or nothing; the error of a full disk says that nothing can be resumed."""
     from sessions.file_access import whole_or_nothing
     from sessions.recording.schema import DiskRefused, NotEmpty, RecordingError
 

@@ -96,7 +96,7 @@ def _print(
     afferent: AfferentSettings,
     console: Console,
 ) -> None:
-    """Print the report's own tables of the trials, and what they have no column for."""
+    """Print the report's tables of the trials, and the numbers without a column there."""
     from daq_app.cli.report_tables import table_texts  # slow to load
     from sessions.report import Further, numbers_alone
 
@@ -122,7 +122,7 @@ def _print(
 
 
 def _response(row: TrialPrediction, name: str, factor: float) -> tuple[str, str]:
-    """Return the value of a quantity at the ending, times a factor, and its relative error."""
+    """Return the value of a quantity at the ending, times a factor, and its relative error, as texts."""
     if name not in row.responses:
         return "–", "–"
     value, error = row.responses[name]
@@ -130,7 +130,7 @@ def _response(row: TrialPrediction, name: str, factor: float) -> tuple[str, str]
 
 
 def _afferent(options: argparse.Namespace) -> AfferentSettings:
-    """Return the parameters of the afferent with those that were set. Raises WrongValue."""
+    """Return the afferent's parameters, with those set by options. Raises WrongValue."""
     changes = numbers_by_key(options.afferent_set, "--afferent-set", "static_gain=30")
     try:
         return settings_with(changes, options.afferent_seed, options.quantity)

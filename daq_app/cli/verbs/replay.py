@@ -43,7 +43,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         wall_s = time.perf_counter() - start
         differences = [*different_readings(recording, copy), *first_sentences(list(different_events(recording, copy)))]
         items = ["readings", "events", ANALYSIS]
-        decisions = read(recording.folder)  # people decided about the recording, not about its replay
+        decisions = read(recording.folder)  # decisions belong to the recording, not to its replay
         analysis = stored_document(options.session, ANALYSIS)
         if analysis is None:
             analysis = json.loads(json.dumps(repeat(ANALYSIS, {}, recording, decisions)))
@@ -78,7 +78,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _notes(recording: Recording) -> Iterator[str]:
-    """Say what a replay of such a recording cannot show."""
+    """Yield a note on each aspect that a replay of this recording cannot check."""
     if not recording.plan.forces:
         yield "a visit that only scored: there are no readings, and its course follows what people did"
     elif not recording.plan.trials:

@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    # Imported here: drawing is slow to load, and what is wrong with the session should be said before.
+    # Imported here: drawing is slow to load, and errors of the session should come first.
     recording, other_sessions, unreadable = open_visit(options.session, options.subject, console)
     score_only = [reveal(Recording.open(folder)) for folder in options.scores]
     score_only += [visit for visit in other_sessions if any(record.score is not None for record in visit.trials)]
@@ -66,7 +66,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     afferent = stored_afferent(recording)
     if options.afferent and (afferent is None or afferent.quantity != options.quantity):
         afferent = usual_settings(options.quantity)
-    # What was asked before is asked again, so that nothing kept is lost, and what a page shows.
+    # Earlier options are kept, so that no stored number is lost, and the page's own are added.
     choices = replace(stored_options(recording, options.variants or "small"), intervals=True, course="history")
     prediction = predict_session(recording, analysis, console, choices, afferent)
     from sessions.report import findings
@@ -82,7 +82,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     report = findings(recording, analysis, prediction, [score_table(visit) for visit in score_only], further=further)
     console.progress(0.9, "drawing")
     drawings = pages.plates(report)
-    if options.out is None:  # beside the recording it is one more thing made of it, and listed in its manifest
+    if options.out is None:  # in the session's folder it is a derived file, listed in the manifest
         page = store_page(recording.folder, _PAGE, pages.page(report, drawings))
     else:
         page = options.out
@@ -94,7 +94,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _check_scores(visit: Recording, recording: Recording) -> None:
-    """Raise WrongValue where a visit named by --scores adds nothing to a report, not even a sentence."""
+    """Raise WrongValue if a visit named by --scores adds nothing to a report."""
     stimuli = {(trial.stimulus.descriptor, trial.stimulus.index) for trial in recording.plan.trials}
     table = score_table(visit)
     if not table.other_answers and stimuli.isdisjoint((score.descriptor, score.index) for score in table.scores):

@@ -82,7 +82,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         request = StartSession(session_plan, str(folder.absolute()), people, settings, any_folder=options.any_folder)
         outcome = attend_session(recorder, request, console)
     end = outcome.end
-    if Path(outcome.folder) != folder.absolute():  # it was taken away meanwhile
+    if Path(outcome.folder) != folder.absolute():  # the folder was removed during the session
         folder = Path(outcome.folder)
     console.result({"session": str(folder), "end": asdict(end), "sealed": outcome.sealed, "seed": seed})
     console.say(f"{folder}: {end.reason}; {end.readings} readings, {end.health.lost} lost")
@@ -96,7 +96,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _choices(options: argparse.Namespace) -> tuple[Protocol, int, Body, StudyPlace | None]:
-    """Return protocol, seed, the subject's own and its place, as a study or the command line decides them."""
+    """Return protocol, seed, the subject's own values and study place, from a study or the command line."""
     if options.study is None:
         seed = secrets.randbelow(2**31) if options.seed is None else options.seed
         return protocol(options.protocol), seed, body_of(options), None

@@ -36,11 +36,11 @@ EXAMPLE = "daq-app selftest --out recordings"
 KILLS = 6
 STOPS = 3
 CUTS = 20
-_PACE = 20.0  # simulated seconds a real second
-RUNNING = (0.2, 1.0)  # how long a session runs until it is killed [s]
-DEADLINE = 40.0  # for a recorder that does not answer [s]
+_PACE = 20.0  # simulated seconds per real second
+RUNNING = (0.2, 1.0)  # duration of a session before it is killed [s]
+DEADLINE = 40.0  # for a recorder to answer [s]
 QUOTA = 4 * 2**20  # [bytes]
-_RATE = 7000  # of the made-up readings that fill it [Hz]
+_RATE = 7000  # of the artificial readings that fill it [Hz]
 _PLAN = plan(protocol("sensotact-friction"), "SELFTEST", 1)
 Progress = Callable[[float, str], None]
 AReport = TypeVar("AReport", bound=m.Report)
@@ -75,13 +75,13 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 class SelfTestFailed(Exception):
-    """Something that is promised did not hold; the message says what."""
+    """A guarantee did not hold; the message says which."""
 
 
 def selftest(room: Path, progress: Progress) -> dict[str, Any]:
-    """Try everything in the folder `room`, which is empty, and return the certificate.
+    """Run every test in the empty folder `room`, and return the certificate.
 
-    Raises SelfTestFailed where a promise did not hold, RecordingError where the disk allows no recording at all.
+    Raises SelfTestFailed if a guarantee does not hold, RecordingError if the disk allows no recording at all.
     """
     start = time.monotonic()
     chance = random.Random()
@@ -114,7 +114,7 @@ def selftest(room: Path, progress: Progress) -> dict[str, Any]:
 
 
 class _WatchedRecorder:
-    """A recorder on the simulated bench, and what it sent."""
+    """A recorder on the simulated bench, and its reports."""
 
     def __init__(self) -> None:
         self.recorder = Recorder.start(_PACE)
@@ -125,7 +125,7 @@ class _WatchedRecorder:
         self._queue: list[m.Report] = []
 
     def until(self, report_type: type[AReport]) -> AReport:
-        """Return the next report of a kind."""
+        """Return the next report of a type. Raises SelfTestFailed."""
         for report in self._reports(DEADLINE):
             if isinstance(report, report_type):
                 return report
@@ -134,18 +134,18 @@ class _WatchedRecorder:
         raise SelfTestFailed(f"the recorder did not answer within {DEADLINE:g} s")
 
     def hear(self, seconds: float) -> None:
-        """Note what comes within `seconds`."""
+        """Take note of the reports within `seconds`."""
         for _ in self._reports(seconds):
             pass
 
     def close(self) -> None:
-        """Kill it, and note what was still on its way; one that lived on would rescue what is removed then."""
+        """Kill the recorder, and note reports under way; alive, it would rescue the folder that is then removed."""
         self.recorder.kill()
         if not any(isinstance(report, m.Gone) for report in self._reports(DEADLINE)):
             raise SelfTestFailed("a recorder that was killed did not end")
 
     def _reports(self, seconds: float) -> Iterator[m.Report]:
-        """Yield what comes within `seconds`, each noted; what nobody takes any more waits for the next call."""
+        """Yield the reports within `seconds`, after noting each; those not consumed wait for the next call."""
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
             self._queue += self.recorder.poll(0.01)
@@ -159,15 +159,15 @@ class _WatchedRecorder:
                     case m.Live(received_ns=received_ns) if len(received_ns) and not self._has_ended:
                         self.newest_ns = int(received_ns[-1])
                     case m.SessionEnded():
-                        self._has_ended = True  # what is shown from now on is not recorded
+                        self._has_ended = True  # later readings are not recorded
                 yield report
 
 
 def _try_kills(room: Path, chance: random.Random, progress: Progress) -> tuple[dict[str, Any], list[Path]]:
-    """Kill the recorder while a session runs, and go on with it, again and again.
+    """Kill the recorder during a session, and resume it, repeatedly.
 
-    Return how many readings and events were acknowledged and there afterwards, and how much of what was shown and not
-    yet acknowledged was lost at most [s, session clock]; and copies of the folder as the kills left it.
+    Return the number of readings and events acknowledged and found afterwards, the greatest loss of readings shown but
+    not yet acknowledged [s, session clock], and copies of the folder as the kills left it.
     """
     readings = events = 0
     most_lost = 0.0
@@ -187,12 +187,12 @@ def _try_kills(room: Path, chance: random.Random, progress: Progress) -> tuple[d
         copies.append(room / f"copy-{number}")
         shutil.copytree(folder, copies[-1])
         if recording.end is not None:
-            folder = room / f"killed-{number + 1}"  # this session had come to its end before it was killed
+            folder = room / f"killed-{number + 1}"  # the session had ended before the kill
     return {"number": KILLS, "readings": readings, "events": events, "most_lost": max(most_lost, 0.0)}, copies
 
 
 def _begin_or_resume(witness: _WatchedRecorder, folder: Path) -> int | None:
-    """Have a session running, and return the trial at which it was resumed."""
+    """Begin or resume a session, and return the trial at which it was resumed, None if it is new."""
     if not folder.exists():
         witness.recorder.send(m.Connect("sim:?seed=1"))
         witness.until(m.Device)
@@ -205,7 +205,7 @@ def _begin_or_resume(witness: _WatchedRecorder, folder: Path) -> int | None:
 
 
 def _check_recording(recording: Recording, witness: _WatchedRecorder, trial: int | None) -> None:
-    """Raise SelfTestFailed unless all that was acknowledged is in the file, and the session went on where it was."""
+    """Raise SelfTestFailed unless everything acknowledged is in the file and the session resumed at its trial."""
     rows = {event.number: event_row(event) for event in recording.events}
     if any(rows.get(event.number) != event_row(event) for event in witness.events):
         raise SelfTestFailed("an event that had been acknowledged was not in the file after a kill")
@@ -235,7 +235,7 @@ def _try_stops(room: Path) -> float:
 
 
 def _try_cuts(copies: list[Path], folder: Path, chance: random.Random) -> int:
-    """Cut the ends off copies of a log, as a power cut may; return how often. Raises SelfTestFailed."""
+    """Cut the ends off copies of a log, as a power cut may; return the number of cuts. Raises SelfTestFailed."""
     for number in range(CUTS):
         shutil.copytree(copies[number % len(copies)], folder)
         log = folder / f"{LIVE_FILE}-wal"
@@ -245,7 +245,7 @@ def _try_cuts(copies: list[Path], folder: Path, chance: random.Random) -> int:
         try:
             sequence = Recording.open(folder).readings().sequence
         except RecordingError as error:
-            # A log cut back to before its first commit leaves a session that had not begun.
+            # A log cut back to before its first commit leaves no session.
             if log.stat().st_size > 100_000:
                 raise SelfTestFailed(f"a log whose end was cut off could not be read ({error})") from error
         else:
@@ -256,18 +256,18 @@ def _try_cuts(copies: list[Path], folder: Path, chance: random.Random) -> int:
 
 
 class _QuotaWriter(SessionWriter):
-    """A writer whose file may grow to a size, and further when the reserve is given back."""
+    """A writer whose file may grow up to a quota, and by the reserve once that is released."""
 
     def give_back_reserve(self) -> None:
-        """Give it back, and let the file grow into it."""
+        """Release the reserve, and let the file grow into it."""
         super().give_back_reserve()
         self.limit(QUOTA + RESERVE)
 
 
 def _try_quota(folder: Path) -> dict[str, Any]:
-    """Record until there is no more room; all must be there, and the end written. Raises SelfTestFailed.
+    """Record until the quota is full; every reading and the end must be stored. Raises SelfTestFailed.
 
-    Return the room [bytes], the readings acknowledged, and the median time to make a second of them safe [ms].
+    Return the quota [bytes], the readings acknowledged, and the median time to make a second of them safe [ms].
     """
     clock = RealClock()
     calibration = Calibration("SELFTEST", "counts", np.eye(6), np.full(6, np.nan), "made up for the selftest")
@@ -301,6 +301,6 @@ def _try_quota(folder: Path) -> dict[str, Any]:
 
 
 def _numbered_readings(first: int, received_ns: int, count: int = _RATE) -> ReadingBlock:
-    """Return readings whose numbers follow from their place."""
+    """Return readings whose values follow from their sequence numbers."""
     i = np.arange(first, first + count, dtype=np.int64)
     return ReadingBlock(i, i, i * 0, i / _RATE, np.full(count, received_ns, np.int64), np.outer(i, np.arange(1.0, 7.0)))

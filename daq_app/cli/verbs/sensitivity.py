@@ -43,8 +43,8 @@ from solver import Scene
 
 EXAMPLE = "daq-app sensitivity scene.toml --samples 64"
 _NAMES = [quantity.name for quantity in QUANTITIES]
-_SAMPLES, OF_FINGERS = 32, 64  # usual ones
-# Options that say nothing of a single scene, and their usual values.
+_SAMPLES, OF_FINGERS = 32, 64  # defaults
+# Options that do not apply to a single scene, and their defaults.
 _OF_FINGERS = {"quantity": "sed", "kinematics": "small", "keep": None, "workers": None, "scheduler": None}
 
 
@@ -106,7 +106,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
-    """Ask all fingers and print the signs of the slope of one quantity, and the shares of all."""
+    """Solve all fingers and print the signs of one quantity's slope, and the shares of all quantities."""
     column_index = _NAMES.index(options.quantity)
     label = QUANTITIES[column_index].label
     changes = sign_map.single_changes(options.kinematics)
@@ -125,7 +125,7 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     radii = dict(zip(map_trials, answers[len(changes) :], strict=False))
     random = answers[len(changes) + len(map_trials) :]
     published = single["as published"]
-    assert not isinstance(published, str)  # a finger that can be
+    assert not isinstance(published, str)  # this finger always has an answer
     signs = sign_map.same_signs(random, published)
     shares = {name: sign_map.share(column) for name, column in zip(_NAMES, signs.T, strict=True)}
     indices = {name: sign_map.slope_indices(random, name, column_index, options.seed) for name in SERIES}
@@ -219,7 +219,7 @@ def _mark(answer: Answer | str, position: int, column: int) -> str:
 
 
 def _print_thirds(name: str, points: Array, signs: Array, label: str, console: Console) -> None:
-    """Print the share of fingers that keep the signs in each third of the number that moves the slope most."""
+    """Print the share of fingers that keep the signs in each third of the most influential number."""
     rows = [
         f"{100 * kept_share:.0f} % at {number(low)} to {number(high)}"
         for low, high, kept_share in sign_map.shares_by_thirds(signs, points[:, list(sign_map.DESIGN).index(name)])

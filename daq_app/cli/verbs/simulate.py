@@ -17,7 +17,7 @@ from sessions.plan.protocols.protocol import LARGEST_SEED
 
 EXAMPLE = "daq-app simulate net-ft --rdt-port 50000 --tcp-port 50001 --http-port 8080"
 _BAUDS = (4800, 9600, 19200, 38400, 57600, 115200)
-PORTS = {"rdt_port": 49152, "tcp_port": 49151, "http_port": None}  # of net-ft, where none are given
+PORTS = {"rdt_port": 49152, "tcp_port": 49151, "http_port": None}  # of net-ft, by default
 OF_ONE_WIRE = {**dict.fromkeys((*PORTS, "rate"), "net-ft"), "baud": "serial-ft"}
 
 

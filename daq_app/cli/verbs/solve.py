@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 EXAMPLE = "daq-app solve stickiness-100.toml --json"
 UNFINISHED = "Stopped before all that was asked for was done: this is what had been found by then."
 _UNITS = [("" if unit == "1" else unit, factor) for unit, factor in (response.shown_unit for response in QUANTITIES)]
-# What a course gives beside the quantities, and the units of both.
+# Numbers of a load path besides the quantities, and the units of both.
 _COURSE = ("SED at the ending", "SED at the point", "normal force", "tangential force", "contact width")
 COURSE_UNITS = [SED.shown_unit, SED.shown_unit, ("N/mm", 1.0), ("N/mm", 1.0), ("mm", 1.0), *_UNITS]
-_EXACT = 1e-9  # relative error below which a number was given, and not solved for
+_EXACT = 1e-9  # relative error below which a number was an input, not a result
 AUDITS = {
     "equilibrium_x": "forces along the surface are out of balance by",
     "equilibrium_y": "forces across the surface are out of balance by",
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Solve the scene and print what came out; stopped by the user, what was found by then."""
+    """Solve the scene and print the results; after a stop by the user, those found so far."""
     from sessions.toml_file import load_toml
     from solver import Scene, SolveFailure, solve
 
@@ -72,7 +72,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _row_receptor(scene: "Scene", depth: float | None) -> "Receptor | None":
-    """Return an ending like the scene's at another depth [mm]. Raises WrongValue where the skin has no room for it."""
+    """Return the scene's ending at another depth [mm]. Raises WrongValue if it does not fit into the skin."""
     if depth is None:
         return None
     half, skin = scene.receptor.ending[0] / 2.0, scene.finger.epidermis + scene.finger.dermis
@@ -188,7 +188,7 @@ def _plain(table: "Array") -> list[list[float | None]]:
 
 
 def _with_error(value: float, error: float, factor: float) -> str:
-    """Return a number times `factor` with two digits of its error, or with four where that is round-off or unknown."""
+    """Return a number times `factor` with two digits of its error, or with four if that is round-off or unknown."""
     if not _EXACT * max(abs(value), 1.0 / factor) < error < inf:
         return f"{number(value, 4, factor=factor)} ± {number(error, 2, factor=factor)}" if isfinite(value) else "–"
     decimals = max(0, 1 - floor(log10(factor * error)))
@@ -196,7 +196,7 @@ def _with_error(value: float, error: float, factor: float) -> str:
 
 
 def _row_in_json(row: "Row") -> dict[str, object]:
-    """Return arc positions [mm], every quantity there and its errors, None where the finger ends."""
+    """Return arc positions [mm], every quantity there and its errors, with None beyond the finger's end."""
     from solver.prediction import ROW
 
     values, errors = (dict(zip(NAMES, _plain(table), strict=True)) for table in row)

@@ -42,12 +42,12 @@ from sessions.statistics.visit import VisitOptions, exclusions_in
 from sessions.strokes.stroke import FIXED
 
 _SUBJECTS, SURFACES = (3, 5, 10, 15, 20, 30), (3, 5, 8, 12)  # of the designs whose power is simulated
-# Likewise of those that tell quantities apart, or do not: one such study takes a thousand times as long.
+# Of the designs that should distinguish quantities: one such study takes a thousand times as long.
 RIVAL_SUBJECTS, RIVAL_SURFACES, RIVAL_STUDIES = (12, 24), (5, 8), 40
 
 
 def add_power(parser: argparse.ArgumentParser) -> None:
-    """Declare --power and what goes with it."""
+    """Declare --power and the options that belong to it."""
     defaults = ", ".join(f"{field.name}={field.default:g}" for field in fields(AssumedEffects))
     meaning = f"how many subjects and surfaces a study needs, by simulation; what it assumes may be set: {defaults}"
     parser.add_argument("--power", nargs="*", metavar="NAME=VALUE", help=meaning)
@@ -60,7 +60,7 @@ def add_power(parser: argparse.ArgumentParser) -> None:
 
 
 def print_power(options: argparse.Namespace, console: Console) -> int:
-    """Print the power of designs of so many subjects and surfaces."""
+    """Print the power of designs with several numbers of subjects and surfaces."""
     if options.folder is not None or options.synthetic is not None:
         raise WrongValue("--power simulates its own studies: leave FOLDER and --synthetic out")
     effects = _assumed_effects(options.power)
@@ -89,7 +89,7 @@ def print_power(options: argparse.Namespace, console: Console) -> int:
 
 
 def _recovery(options: argparse.Namespace, effects: AssumedEffects, console: Console) -> list[Recovery]:
-    """Return how often studies at the depths asked for tell the quantity from its rivals; [] where none are."""
+    """Return how often studies at the given depths distinguish the quantity from its rivals; [] without depths."""
     if not options.depths:
         return []
     depths = tuple(options.depths)
@@ -126,7 +126,7 @@ def _print_recovery(recoveries: Sequence[Recovery], options: argparse.Namespace,
 
 
 def _assumed_effects(texts: Sequence[str]) -> AssumedEffects:
-    """Return what a power simulation assumes, with the values that were set. Raises WrongValue."""
+    """Return the assumptions of a power simulation, with the values set by options. Raises WrongValue."""
     names = [field.name for field in fields(AssumedEffects)]
     changes = numbers_by_key(texts, "--power", "effect=20")
     for name, value in changes.items():
@@ -164,7 +164,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Pool the study, write page, table and numbers, and print what it says in short; or print the power of designs."""
+    """Pool the study, write page, table and numbers, and print a summary; or print the power of designs."""
     if options.power is not None:
         return print_power(options, console)
     if options.depths is not None:
@@ -173,7 +173,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         raise WrongValue("give a FOLDER of sessions, or --synthetic SEED, and not both")
     if options.synthetic is None:
         return _pool(options, options.folder, options.out or options.folder / "pooled", console)
-    # Simulators are loaded only where they are asked for.
+    # Simulators are loaded only on request.
     from daq_app.simulation.synthetic import recordings_in, synthetic_study
 
     folder = options.out or Path("synthetic-results") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
@@ -190,7 +190,7 @@ def _pool(options: argparse.Namespace, folder: Path, output: Path, console: Cons
     model = PredictionOptions(options.tau, course="steady", kinematics=options.kinematics, intervals=intervals)
     along = options.quantity if options.paths != "none" else SED.name
     visit_options = VisitOptions(model, area_law(options) or FIXED, options.paths, options.calibration_error, along)
-    # Errors in these are reported before hours of work.
+    # Errors in these files are reported before hours of work.
     exclusions, truth = exclusions_in(folder), _load_ground_truth(folder)
     shelf = Shelf(output / "results", visit_options)
     results, failures = visits(
@@ -210,7 +210,7 @@ def _pool(options: argparse.Namespace, folder: Path, output: Path, console: Cons
 
 
 def _load_ground_truth(folder: Path) -> dict[str, Any] | None:
-    """Return the ground truth of a synthetic study, None of any other. Raises RecordingError where it is damaged."""
+    """Return the ground truth of a synthetic study, None for any other. Raises RecordingError if it is damaged."""
     path = folder / GROUND_TRUTH_FILE
     if not path.is_file():
         return None

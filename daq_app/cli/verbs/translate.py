@@ -60,7 +60,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def protocol_texts(source: Protocol, language: str) -> tuple[str, int]:
-    """Return the tables of a language, and how many blocks have none yet. Raises WrongValue for the protocol's own."""
+    """Return a language's tables, and the number of untranslated blocks. Raises WrongValue for the protocol's own."""
     if language == source.language:
         raise WrongValue(f"--language {language} is the protocol's own: its texts stand in the blocks")
     earlier = {text.block: text for text in source.translations if text.language == language}
@@ -78,7 +78,7 @@ def protocol_texts(source: Protocol, language: str) -> tuple[str, int]:
 
 
 def window_texts() -> list[str]:
-    """Return every text of the experimenter's windows, as it stands in the sources, and the fields and quantities."""
+    """Return every text of the experimenter's windows as in the sources, and those of fields and quantities."""
     labels = (*(field.label for field in FIELDS), *(shown_response(quantity.name).label for quantity in QUANTITIES))
     texts = dict.fromkeys(labels)
     for source in sorted(PROGRAM.rglob("*.py")):
@@ -90,7 +90,7 @@ def window_texts() -> list[str]:
 
 
 def program_texts(context: str, texts: Iterable[str], language: str) -> tuple[str, int]:
-    """Return the XLIFF file of a language, and how many of the texts are not translated."""
+    """Return the XLIFF file of a language, and the number of untranslated texts."""
     earlier = translations(context, language)
     root = ElementTree.Element("xliff", version="1.2", xmlns="urn:oasis:names:tc:xliff:document:1.2")
     about = {"original": context, "datatype": "plaintext", "source-language": ENGLISH, "target-language": language}

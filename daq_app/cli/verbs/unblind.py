@@ -46,7 +46,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     note(folder, "unblinded", {"by": options.by, "session": None if is_study_folder else path.resolve().name})
     names: list[str] = []
     for recording in recordings:
-        # Numbers and pages that were made of it while it was blinded.
+        # Numbers and pages derived from the session while it was blinded.
         files = [path for path in sorted(recording.folder.iterdir()) if path.is_file() and path.name not in RECORDED]
         results = [path for path in files if path.suffix in (".json", ".jsonl", ".html")]
         made_before = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in results}
@@ -66,7 +66,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _select(sessions: tuple[Recording, ...], key: Key, *, alone: bool) -> tuple[list[Recording], list[str]]:
-    """Return the sessions to be unblinded, and a sentence for each that cannot be; `alone`: one that was asked for."""
+    """Return the sessions to unblind, and a sentence for each that cannot be; `alone`: one session was named."""
     recordings: list[Recording] = []
     refusals: list[str] = []
     for recording in sessions:
