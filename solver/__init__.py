@@ -69,6 +69,11 @@ __all__ = [
 ]
 
 
+def __dir__() -> list[str]:
+    """Return the public names, those loaded late too."""
+    return __all__
+
+
 def __getattr__(name: str) -> object:
     """Return what is loaded late. Raises AttributeError for what there is not."""
     if name not in _LATER:

@@ -64,20 +64,26 @@ class NotConverged(SolveFailure):
     kind = "not_converged"
 
 
-class CutFolds(NotConverged):
-    """Tissue beside the free cut folds, so that finer meshes come to other folds and no error is known."""
+class Folds(NotConverged):
+    """Tissue folds, at the free cut or in wrinkles, so that finer meshes come to other folds and no error is known."""
 
 
-def cut_folds(least: float, folds: float) -> CutFolds:
+def cut_folds(least: float, folds: float) -> Folds:
     """Return the failure where tissue is squeezed to `least` of its length, and a free face folds at `folds` [-].
 
     >>> str(cut_folds(0.31, 0.54))[:88]
     'tissue beside the free cut folds (it is squeezed to 31 % of its length, and a free face '
     """
-    return CutFolds(
+    return Folds(
         f"tissue beside the free cut folds (it is squeezed to {100 * least:.0f} % of its length, and a free face folds "
         f'at {100 * folds:.0f} %): ask for finger.cut = "driven", a longer shaft, or less depth or friction'
     )
+
+
+WRINKLES = (
+    "the tissue is unstable, like a stiff layer that wrinkles on a soft one: ask for less depth or friction, or for "
+    "tissues that differ less in stiffness"
+)
 
 
 class ContactLost(NotConverged):

@@ -15,7 +15,7 @@ class Cancelled(Exception):
 
 
 Listener = Callable[[str, float], None]  # called with the current work, and the part of it done, 0 to 1
-Progress = Callable[[float], bool]  # called with the part done, 0 to 1; returns False to stop the work
+Progress = Callable[[float], bool | None]  # called with the part done, 0 to 1; returns False to stop the work
 
 
 @dataclass(slots=True)
@@ -72,9 +72,9 @@ def check_stop() -> None:
 
 
 def report_part(progress: Progress | None, part: float) -> None:
-    """Call `progress`, if there is one, with the part done. Raises Cancelled where it returns False."""
-    if progress is not None and not progress(part):
-        raise Cancelled
+    """Call `progress`, if there is one, with the part done. Raises Cancelled where it returns False, and not None."""
+    if progress is not None and progress(part) is False:
+        raise Cancelled("the caller stopped the solve")
 
 
 @contextmanager

@@ -21,7 +21,7 @@ import numpy as np
 
 from solver._kernels.compiling import OPEN, SLIP, STICK
 from solver.accuracy.convergence_order import richardson_factor
-from solver.accuracy.error_estimate import EDGE_SHARE, PARTS, NestedState, Steps, errors
+from solver.accuracy.error_estimate import PARTS, NestedState, Steps, edge_share, errors
 from solver.arrays import Array, Indices
 from solver.body import Patches
 from solver.body.linear import Elastic
@@ -146,7 +146,7 @@ def with_shares(
     edge = np.flatnonzero(np.diff(state.state))  # node before each edge of contact
     middle = (finger.arcs[edge] + finger.arcs[edge + 1]) / 2.0
     columns = np.searchsorted(finger.geometry.lines.arcs, middle) - 1
-    np.add.at(parts, columns, EDGE_SHARE * nested.edge_changes[:, 0])
+    np.add.at(parts, columns, edge_share(nested.order) * nested.edge_changes[:, 0])
     whole = float(parts.sum())
     return replace(nested, shares=parts / whole if whole > 0.0 else None)
 

@@ -7,7 +7,8 @@ convex corner of held and free tissue displacements follow r^a, with a of 1/2 or
 At finite strain that corner is squeezed further on each finer mesh. A free face folds where it is squeezed along itself
 below a certain stretch (Biot 1963, Appl. Sci. Res. A 12, 168). Where one element alone falls below it, the mesh does
 not resolve a fold: the corner counts. Where more do, the cut folds. Nothing sets the size of such folds, so that finer
-meshes come to others, and no error is known.
+meshes come to others, and no error is known. The same holds where a stiff layer wrinkles on a soft one (Allen 1969,
+Analysis and Design of Structural Sandwich Panels, chapter 8): its equilibrium without wrinkles is unstable.
 """
 
 from collections.abc import Iterator
@@ -21,7 +22,7 @@ from solver.arrays import Array
 from solver.continuation import critical_stretch
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import Finger, FiniteFinger, finite_laws, settled_moduli
-from solver.failures import cut_folds
+from solver.failures import WRINKLES, Folds, cut_folds
 from solver.prediction import percent
 from solver.scene import Scene
 from solver.scene.tables import TISSUES, Materials
@@ -40,11 +41,14 @@ def order_of(finger: Finger[Any], state: EquilibriumState) -> float:
     """Return the order of convergence that an estimate assumes, from the `state` on its nested mesh.
 
     It is `CORNER_ORDER` where the element at the corner of bone and cut is squeezed, where neighbouring tissues differ
-    in stiffness by more than in trials that show second order, or where skin stiffens as it stretches. Raises CutFolds.
+    in stiffness by more than in trials that show second order, or where skin stiffens as it stretches. Raises Folds,
+    where tissue wrinkles too.
     """
     scene = finger.scene
     squeezed = _check_cut(finger, state) if isinstance(finger, FiniteFinger) and scene.finger.cut == "free" else False
-    stiffens = any(tissue.law == "ogden" for tissue in scene.materials.by_region)
+    if not finger.newton.is_stable(state):
+        raise Folds(WRINKLES)
+    stiffens = any(tissue.law == "ogden" for tissue in scene.meshed_tissues)
     at_corner = squeezed or stiffens or _stiffness_ratio(scene.materials)[0] > SECOND_ORDER[scene.solve.kinematics]
     return CORNER_ORDER if at_corner else ORDER
 
@@ -52,7 +56,7 @@ def order_of(finger: Finger[Any], state: EquilibriumState) -> float:
 def _check_cut(finger: FiniteFinger, state: EquilibriumState) -> bool:
     """Return whether an element beside the free cut of a nested mesh is squeezed below the stretch at which faces fold.
 
-    Raises CutFolds where more than one is, at one end.
+    Raises Folds where more than one is, at one end.
     """
     mesh = finger.body.mesh
     columns = np.arange(len(mesh.elements)).reshape(len(finger.geometry.arcs) - 1, -1)

@@ -37,20 +37,38 @@ from solver.quantities import NAMES
 from solver.scene import Scene
 from solver.scene.tables import USUAL_TOLERANCE
 
-# Parts of the change when an edge of contact moves by one node. Numbers depend on the place of an edge by a parabola
-# about the true place, at most half a node away; the width depends on it linearly.
-EDGE_SHARE, WIDTH_EDGE_SHARE = 1.0 / 3.0, 0.5
 SHIFT, _WIDTH = 4, 5  # places of the bone's shift and of the contact's width among the numbers
-_EDGE_SHARES = np.where(np.arange(COUNT) == _WIDTH, WIDTH_EDGE_SHARE, EDGE_SHARE)
 
 
-def half_width(change: Array, edges: Array, order: float = ORDER, part: Array | float = EDGE_SHARE) -> Array:
+def half_width(change: Array, edges: Array, order: float = ORDER, share: Array | None = None) -> Array:
     """Return the error estimate of numbers (...) from their `change` to the nested mesh.
 
-    `edges` (m, ...) are their changes there as one edge of contact after the other moves, of which a `part` counts.
-    Errors fall with the power `order` of the element size.
+    `edges` (m, ...) are their changes there as one edge of contact after the other moves, of which a `share` counts, by
+    default `edge_share`. Errors fall with the power `order` of the element size.
     """
-    return richardson_factor(order) * np.abs(change) + part * edges.sum(axis=0)
+    return richardson_factor(order) * np.abs(change) + (edge_share(order) if share is None else share) * edges.sum(
+        axis=0
+    )
+
+
+def edge_share(order: float) -> float:
+    """Return the share of a number's change that counts as an edge of contact moves by one node of the nested mesh.
+
+    The number depends on the place of the edge by a parabola about its true place, at most one such node away on the
+    mesh and half a node on the nested one. So its errors there lie between 0 and the change c, and 0 and c/4. The
+    extrapolated error has the part r E_h + (1 - r) E_H of them, r being `richardson_factor`.
+
+    >>> round(edge_share(2.0), 4), edge_share(1.0)
+    (0.3333, 1.0)
+    """
+    factor = richardson_factor(order)
+    return max(factor / 4.0, factor - 1.0)
+
+
+def _edge_shares(order: float) -> Array:
+    """Return the shares (COUNT,); the contact's width follows its edges by a line, to either side of its true value."""
+    factor = richardson_factor(order)
+    return np.where(np.arange(COUNT) == _WIDTH, factor / 2.0 + factor - 1.0, edge_share(order))
 
 
 PARTS = np.array([0.48, 0.68])  # of the usual steps: 12 and 17 of 25, about a half and two thirds
@@ -211,7 +229,7 @@ def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: St
     if nested is None:
         return _without_prescribed(scene, Errors(1.0, 1.0, 1.0, 1.0, 1.0, None, 1.0, 1.0, np.full(len(NAMES), np.nan)))
     change = nested.numbers - numbers
-    error = half_width(change, nested.edge_changes, nested.order, _EDGE_SHARES)
+    error = half_width(change, nested.edge_changes, nested.order, _edge_shares(nested.order))
     if steps is not None:
         error += steps.error
     relative = error / np.maximum(np.abs(numbers), np.finfo(float).tiny)

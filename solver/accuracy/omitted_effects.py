@@ -17,6 +17,7 @@ from solver.body import Patches
 from solver.constitutive import HUMAN_SKIN
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import Finger, LinearFinger
+from solver.equilibrium.load_path import PRESSING_TIME
 from solver.failures import NoSteadyState, SolveFailure
 from solver.prediction import Prediction, percent
 from solver.scene import Scene
@@ -177,18 +178,20 @@ def _bone(scene: Scene, force: Array) -> dict[str, Any]:
 
 
 def _inertia(scene: Scene, normal: float, length: float) -> dict[str, Any]:
+    if scene.loading.direction and scene.solve.course == "steady" and not scene.loading.dragged:
+        return {"estimate": 0.0, "from": {}, "how": "a finger that slides at constant speed keeps its shape"}
     pressure = normal / length if length else 0.0
-    speed = max(scene.loading.speed if scene.loading.direction else 0.0, scene.loading.depth)
+    speed = max(scene.loading.speed if scene.loading.direction else 0.0, scene.loading.depth / PRESSING_TIME)
     return {
         "estimate": 2.0 * _DENSITY * speed**2 / pressure if pressure else None,
         "from": {"mean_pressure_MPa": pressure, "speed_mm_s": speed},
-        "how": "pressure of moving tissue (density times speed squared, 1.1 g/cm3) by the mean contact pressure, "
-        "twice for an energy",
+        "how": "pressure of tissue that starts or stops (density times speed squared, 1.1 g/cm3) by the mean contact "
+        "pressure, twice for an energy",
     }
 
 
 def _viscosity(scene: Scene, slide: float) -> dict[str, Any]:
-    duration = 2.0 * slide / scene.loading.speed if scene.loading.direction else 0.0
+    duration = slide_duration(scene, slide)
     if scene.materials.relax and scene.solve.course == "history":
         longest = scene.materials.longest_relaxation
         how = "tissues relaxed as the scene says, until nothing changed"
@@ -205,14 +208,19 @@ def _viscosity(scene: Scene, slide: float) -> dict[str, Any]:
     return {
         "estimate": max(_overstress_after(duration, terms) for terms in series),
         "from": {"slide_s": duration, "relaxation_s": sorted({tau for terms in series for tau, _ in terms})},
-        "how": f"stress above its relaxed value when sliding has settled, {series_text}",
+        "how": f"energy of the stress above its relaxed value when sliding has settled, {series_text}",
     }
 
 
 def _overstress_after(duration: float, terms: Sequence[tuple[float, float]]) -> float:
-    """Return the relative overstress after a press of 1 s and a slide that lasts `duration` [s]."""
+    """Return the relative surplus of energy after a press of 1 s and a slide that lasts `duration` [s]."""
     overstress = sum(g * tau * (np.exp(-duration / tau) - np.exp(-(duration + 1.0) / tau)) for tau, g in terms)
-    return float(overstress) / (1.0 - sum(g for _, g in terms))
+    return float(1.0 + overstress / (1.0 - sum(g for _, g in terms))) ** 2 - 1.0
+
+
+def slide_duration(scene: Scene, drift: float) -> float:
+    """Return how long the bone slides until the slide has settled [s]: by the skin's own `drift` along it [mm]."""
+    return drift / scene.loading.speed if scene.loading.direction else 0.0
 
 
 def _history(scene: Scene, sticking: float, slide: float) -> dict[str, Any]:
@@ -228,7 +236,7 @@ def _history(scene: Scene, sticking: float, slide: float) -> dict[str, Any]:
 
 
 def _width(scene: Scene, width: float) -> dict[str, Any]:
-    nu = max(tissue.nu for tissue in scene.materials.by_region)
+    nu = max(tissue.nu for tissue in scene.meshed_tissues)
     return {
         "estimate": nu**2 * min(1.0, width / scene.finger.width),
         "from": {"contact_width_mm": width, "finger_width_mm": scene.finger.width, "poisson_ratio": nu},

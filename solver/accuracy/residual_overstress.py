@@ -6,17 +6,15 @@ grows linearly.
 """
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from threading import get_ident
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from solver.accuracy.omitted_effects import RELAXATION, sideways, with_left_out
+from solver.accuracy.omitted_effects import RELAXATION, sideways, slide_duration, with_left_out
 from solver.continuation.finite_states import rough_state
 from solver.continuation.small_states import settled_state
-from solver.equilibrium.finger import FiniteFinger, LinearFinger
+from solver.equilibrium.finger import FiniteFinger, LinearFinger, cached_finger
 from solver.equilibrium.load_path import PRESSING_TIME, LoadPoint, undeformed_path
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
@@ -98,13 +96,16 @@ def residual_overstress(prediction: Prediction) -> ResidualOverstress | None:
     touching = prediction.mesh.skin[[state != "open" for state in prediction.skin.state]]
     slide = sideways(prediction.displacement, touching) if direction else 0.0
     kind, depth = scene.solve.kinematics, scene.loading.depth
-    slide_s = slide / scene.loading.speed if direction else 0.0
+    slide_s = slide_duration(scene, slide)
     parts = (np.arange(1, _STEPS[kind] + 1) / _STEPS[kind]).tolist()
     points = [LoadPoint(PRESSING_TIME * part, depth * part, 0.0) for part in parts]
     if slide > 0.0:
         points += [LoadPoint(PRESSING_TIME + slide_s * part, depth, direction * slide * part) for part in parts]
     try:
-        finger = _coarse_finger(scene.frictionless_press(depth), get_ident())
+        sizing = Sizing(_FINENESS, depth, margin=_MARGIN)
+        finger = cached_finger(
+            FiniteFinger if kind == "finite" else LinearFinger, scene.frictionless_press(depth), sizing
+        )
         state = rough_state(finger, scene) if isinstance(finger, FiniteFinger) else settled_state(scene, finger)
         at_last = finger.sed_ending(finger.displacement(state))
         path = undeformed_path(scene, finger, relaxing=True)
@@ -113,11 +114,3 @@ def residual_overstress(prediction: Prediction) -> ResidualOverstress | None:
     except SolveFailure:
         return None
     return ResidualOverstress(abs(path.energies[-1][0] / at_last - 1.0), slide_s) if at_last > 0.0 else None
-
-
-@lru_cache(maxsize=1)
-def _coarse_finger(scene: Scene, _thread: int) -> LinearFinger | FiniteFinger:
-    """Return a finger on a coarse mesh, cached for consecutive surfaces of one finger in one thread."""
-    kind = scene.solve.kinematics
-    sizing = Sizing(_FINENESS, scene.loading.depth, margin=_MARGIN)
-    return FiniteFinger.of(scene, sizing) if kind == "finite" else LinearFinger.of(scene, sizing)

@@ -28,6 +28,7 @@ class CondensedBody(Protocol):
     middle: Narrow  # (k,) 1 at the middle of an edge whose length follows the deformed skin, else 0
     fixed_length: Array  # (k,) tributary length of each node, where the deformation does not change it [mm]
     stiffness: Array  # (2 k, 2 k) x, y of one node, x, y of the next [N/mm per mm]
+    definite: bool  # whether the last tangent is positive definite with the skin held
     equilibrium: Array | None  # displacements of the last equilibrium, where its tangent is still in memory
     load: Array  # (2 k,) dead loads condensed to the skin, or (n,) those of all unknowns [N/mm]
     force: Array  # (2 k,) condensed internal forces less the dead loads [N/mm]
@@ -104,7 +105,7 @@ class CondensedLinear:
 
         `stiffness` (2 k, 2 k) and the condensed dead `load` (2 k,) list x, y of one node after the other.
         """
-        self.constant, self.bulk = True, 0.0
+        self.constant, self.definite, self.bulk = True, True, 0.0
         self.length_scale = float(np.ptp(rest, axis=0).max()) if len(rest) else 0.0  # the extent of the skin
         self.rest, self.stiffness, self.load = rest, stiffness, load
         self.fixed_length, self.held, self.middle = length, held, np.zeros(len(rest), np.int32)

@@ -10,6 +10,7 @@ import numpy as np
 
 from solver._kernels import elements as element_loops
 from solver._kernels.compiling import bind_arguments
+from solver._kernels.multifrontal import DEFINITE, UNSOLVABLE
 from solver.arrays import Array, BodyState, ElementSystem, Indices, Narrow, SymbolicFactorization
 from solver.body import MeshElements, Patches, held_directions, integrate_elements
 from solver.body.validation import check_body, check_driven, check_laws
@@ -166,6 +167,7 @@ class CondensedFinite:
         """Allocate memory for `body`, and for the overstress of tissues where it `relaxes`."""
         count = len(body.elements.nodes)
         self.body, self.constant, self.length_scale = body, False, body.mesh.length_scale
+        self.definite = True
         self.load = np.zeros(body.size)  # dead loads by unknowns
         self.all_forces = np.zeros(body.size)  # internal forces of all unknowns, less the dead loads
         self.inside = Elimination(body.plan)
@@ -196,7 +198,11 @@ class CondensedFinite:
     def linearise(self, u: Array, pressure: Array) -> bool:
         """Assemble and factorise the tangent at a state; return False where that is inside out or singular."""
         self.equilibrium = None
-        if not self.assemble(u, pressure) > 0.0 or not self.inside.factorise(self.system.tangent):
+        if not self.assemble(u, pressure) > 0.0:
+            return False
+        result = self.inside.factorise(self.system.tangent)
+        self.definite = result == DEFINITE
+        if result == UNSOLVABLE:
             return False
         self._condense()
         return True

@@ -298,7 +298,7 @@ HALVINGS = 40  # of its last step
 
 @lru_cache(maxsize=16)
 def critical_stretch(law: Law) -> float:
-    """Return the stretch along a free surface at which it loses stability in plane strain; LEAST where it never does.
+    """Return the stretch along a free surface at which it loses stability in plane strain; _LEAST where it never does.
 
     Biot's root for neo-Hookean tissue that keeps its volume, 0.5437:
 

@@ -22,7 +22,7 @@ AGREEMENT = 0.1  # relative difference of SED and forces below which states of t
 BEYOND_LIMIT = 0.06  # relative distance beyond a limit at which another path is tried: twice the 3 % accuracy of limits
 
 
-def proven_slide(
+def slide_on_branch(
     finger: FiniteFinger,
     load: LoadState,
     tolerance: float = TO_ROUND_OFF.tolerance,
@@ -162,7 +162,7 @@ def _no_slide(scene: Scene, load: LoadState, proof: ContinuationLimit) -> NoStea
         return _undecided(load, proof)
     ends = (
         "the skin behind the contact folds"
-        if proof.is_near_fold or all(tissue.law != "ogden" for tissue in scene.materials.by_region)
+        if proof.is_near_fold or all(tissue.law != "ogden" for tissue in scene.meshed_tissues)
         else "friction is largest there, with the skin behind the contact squeezed to "
         f"{100 * proof.least_stretch:.0f} %"
     )
@@ -222,6 +222,6 @@ def slide_from_limited_skin(newton: Newton, load: LoadState, tolerance: float) -
     Under a low bound and a large mu, skin is shear-limited at small pressures, so that slip is a bad first guess.
     Raises NotConverged.
     """
-    bare = solve_full_slip(newton, load._replace(mu=0.0), None, tolerance)
-    state = np.where(bare.touching, SHEAR_LIMITED, OPEN).astype(bare.state.dtype)
-    return solve_full_slip(newton, load, replace(bare, state=state, load=load._replace(tau=0.0)), tolerance)
+    frictionless = solve_full_slip(newton, load._replace(mu=0.0), None, tolerance)
+    state = np.where(frictionless.touching, SHEAR_LIMITED, OPEN).astype(frictionless.state.dtype)
+    return solve_full_slip(newton, load, replace(frictionless, state=state, load=load._replace(tau=0.0)), tolerance)

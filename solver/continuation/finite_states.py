@@ -17,8 +17,8 @@ from solver.continuation.existence import (
     BEYOND_LIMIT,
     is_mostly_shear_limited,
     is_on_branch,
-    proven_slide,
     slide_from_limited_skin,
+    slide_on_branch,
 )
 from solver.continuation.limit_point import ContinuationLimit, depth_limit
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, Newton, Termination, load_stepping
@@ -62,7 +62,7 @@ def settled_state(
         return march(scene, finger, step_factor).last
     if scene.normal_force is not None:
         return _state_under_force(finger, scene, scene.normal_force, start, step_factor)
-    return proven_slide(finger, sliding_load(scene), start=start)
+    return slide_on_branch(finger, sliding_load(scene), start=start)
 
 
 def slide_near(finger: FiniteFinger, scene: Scene, start: EquilibriumState) -> EquilibriumState | None:
@@ -142,15 +142,15 @@ def _sliding_under(
             state = (
                 _at_force(newton, near, force) if at_bound else solve_under_forces(newton, near, ForceLoad(force, None))
             )
-            return proven_slide(finger, state.load, start=state)
+            return slide_on_branch(finger, state.load, start=state)
     if at_bound:
         with suppress(NotConverged):
-            *_, bare = _increase_force(newton, load._replace(mu=0.0), force)
+            *_, frictionless = _increase_force(newton, load._replace(mu=0.0), force)
             begin = slide_from_limited_skin(
-                newton, load._replace(depth=bare.load.depth), FORCE_SEARCH.intermediate_tolerance
+                newton, load._replace(depth=frictionless.load.depth), FORCE_SEARCH.intermediate_tolerance
             )
             state = _at_force(newton, begin, force)
-            return proven_slide(finger, state.load, start=state)
+            return slide_on_branch(finger, state.load, start=state)
     states: list[EquilibriumState] = []
     try:
         for state in _increase_force(newton, load, force):
@@ -164,7 +164,7 @@ def _sliding_under(
         raise
     *before, last = states
     try:
-        return proven_slide(finger, last.load, start=last)
+        return slide_on_branch(finger, last.load, start=last)
     except NoSteadyState:  # it lies beyond a limit, which has a force as well as a depth
         return _slide_deeper(finger, before[-1], force)
 
@@ -203,7 +203,7 @@ def _slide_deeper(finger: FiniteFinger, state: EquilibriumState, force: float) -
     if proof.is_certain and proof.numbers[1] < force:
         state = _slide_reaching_force(finger, state, proof, force)
     state = _at_force(finger.newton, state, force)
-    return proven_slide(finger, state.load, start=state)
+    return slide_on_branch(finger, state.load, start=state)
 
 
 def _slide_reaching_force(
@@ -218,7 +218,7 @@ def _slide_reaching_force(
     while most < force:
         report_progress("trying whether the finger slides deeper than it was followed to", most / force)
         try:
-            state = proven_slide(finger, state.load._replace(depth=(1.0 + BEYOND_LIMIT) * depth), start=state)
+            state = slide_on_branch(finger, state.load._replace(depth=(1.0 + BEYOND_LIMIT) * depth), start=state)
         except NoSteadyState as failure:
             raise _beyond(depth, most) from failure
         depth, most = state.load.depth, float(state.force[1])
@@ -292,8 +292,9 @@ def steady_body(
     """
     newton = Newton(body.condensed)
     branch_body = _OwnBody(body, newton)
-    bare = load_stepping.solve_full_slip(newton, load._replace(mu=0.0), start)
-    branch = Continuation(branch_body, BY_FRICTION, critical_stretch(skin)).branch(bare, min(load.mu, LARGEST_MU))
+    frictionless = load_stepping.solve_full_slip(newton, load._replace(mu=0.0), start)
+    continuation = Continuation(branch_body, BY_FRICTION, critical_stretch(skin))
+    branch = continuation.branch(frictionless, min(load.mu, LARGEST_MU))
     where = f"at {load.depth:.4g} mm settled sliding was followed up to mu = {branch.value:.3g}"
     if branch.ends_early and (branch.corrector_failed or branch_body.is_unusable(branch.last)):
         raise NotConverged(f"{where} and lost there; whether there is any at mu = {load.mu:.3g} is not known")

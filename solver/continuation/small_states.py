@@ -8,16 +8,14 @@ wedges the finger into the surface. The limit is found by following the state fr
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from math import log2, sqrt
-from threading import get_ident
 
 import numpy as np
 
 from solver.arrays import Array
 from solver.contact import LoadState
 from solver.equilibrium import EquilibriumState, Newton
-from solver.equilibrium.finger import LinearFinger
+from solver.equilibrium.finger import LinearFinger, cached_finger
 from solver.equilibrium.load_path import march, slide_or_hold
 from solver.equilibrium.load_stepping import forces_of, slide_from_guess, slide_under, sliding_load
 from solver.equilibrium.load_stepping import solve_full_slip as full_slip
@@ -141,17 +139,17 @@ def _strongest(bodies: FingerCache, scene: Scene, force: float, load: LoadState)
     The force is None where a finer mesh disagrees; the result is None where there is no slide.
     """
     depths, bone = [0.0], scene.finger.pulp_thickness()
-    bare = load._replace(mu=0.0)
+    frictionless = load._replace(mu=0.0)
 
     def slide_at(newton: Newton, force: float) -> EquilibriumState | None:
-        return continue_in_friction(newton, load, force, slide_under(newton, bare, force, bone))[0]
+        return continue_in_friction(newton, load, force, slide_under(newton, frictionless, force, bone))[0]
 
-    def rubless(force: float) -> float:
-        return slide_under(bodies.at(bone / 2.0), bare, force, bone).load.depth
+    def frictionless_depth(force: float) -> float:
+        return slide_under(bodies.at(bone / 2.0), frictionless, force, bone).load.depth
 
     def slides(force: float) -> bool:
         with suppress(ContactLost):
-            state = slide_at(bodies.at(rubless(force)), force)
+            state = slide_at(bodies.at(frictionless_depth(force)), force)
             if state is not None:
                 depths.append(state.load.depth)
             return state is not None
@@ -160,7 +158,7 @@ def _strongest(bodies: FingerCache, scene: Scene, force: float, load: LoadState)
     if not slides(LIMIT_SEARCH.min_fraction * force):
         return None
     most = _largest(slides, LIMIT_SEARCH.min_fraction * force, force)
-    finer = bodies.build_for(rubless(most), LIMIT_SEARCH.fineness_ratio * _FINENESS)
+    finer = bodies.build_for(frictionless_depth(most), LIMIT_SEARCH.fineness_ratio * _FINENESS)
     ends = [slide_at(finer, part * most) is None for part in (0.97, 1.03)]
     return most if ends == [False, True] else None, max(depths)
 
@@ -270,7 +268,7 @@ def nearest_state(scene: Scene, finger: LinearFinger) -> EquilibriumState:
         return state
 
 
-def proven_state(scene: Scene, finger: LinearFinger, step_factor: float = 1.0) -> EquilibriumState:
+def state_on_branch(scene: Scene, finger: LinearFinger, step_factor: float = 1.0) -> EquilibriumState:
     """Return the settled state, a path-dependent one after `step_factor` times the usual load steps.
 
     Near or beyond a limit, guesses can converge to states to which no slide leads. Where none was found, or a folded
@@ -331,7 +329,7 @@ def matching_depths(scenes: Sequence[Scene], normal_forces: Sequence[float]) -> 
     if not scenes:
         return ()
     deepest = MAX_DEPTH_SHARE * scenes[0].finger.pulp_thickness()
-    finger = _finger(scenes[0].frictionless_press(deepest), get_ident())
+    finger = _coarse_finger(scenes[0], deepest)
     states = [_rough_slide(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True)]
     return tuple(None if state is None else state.load.depth for state in states)
 
@@ -343,7 +341,7 @@ def expected_depth(scene: Scene) -> float:
         return scene.loading.depth
     deepest = MAX_DEPTH_SHARE * scene.finger.pulp_thickness()
     try:
-        finger = _finger(scene.frictionless_press(deepest), get_ident())
+        finger = _coarse_finger(scene, deepest)
     except (SceneError, NotConverged):  # the solve itself will report it
         return deepest
     state = _rough_slide(finger, scene, force, deepest)
@@ -385,10 +383,9 @@ def check_depth(scene: Scene, depth: float, most: float | None = None) -> None:
     )
 
 
-@lru_cache(maxsize=1)
-def _finger(bare: Scene, _thread: int) -> LinearFinger:
-    """Return the finger on a coarse mesh, cached for consecutive surfaces of one finger in one thread."""
-    return LinearFinger.of(bare, Sizing(COARSE_FINENESS, bare.loading.depth))
+def _coarse_finger(scene: Scene, depth: float) -> LinearFinger:
+    """Return the finger of a scene on a coarse mesh for a `depth` [mm]."""
+    return cached_finger(LinearFinger, scene.frictionless_press(depth), Sizing(COARSE_FINENESS, depth))
 
 
 def _rough_slide(finger: LinearFinger, scene: Scene, normal_force: float, deepest: float) -> EquilibriumState | None:

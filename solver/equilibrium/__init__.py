@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
 
 from solver._kernels import active_set
 from solver._kernels.active_set import DEPTH_CONTROL, DRAG_CONTROL, PUSH_CONTROL, SINGULAR, UNSETTLED
-from solver._kernels.compiling import OPEN, SLIP, STICK, bind_arguments
+from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SLIP, STICK, bind_arguments
 from solver.arrays import (
     Array,
     CondensedArrays,
@@ -49,6 +50,7 @@ class NewtonControl:
     renewal_ratio: float = 0.5  # the same ratio, above which a kept tangent is renewed
     reuse_bulk_step: float = 1e-3  # step times bulk over shear stiffness, above which no tangent is kept
     max_systems: int = 20  # for the contact states of a linear body, beside four for each node
+    ratio_safety: float = 2.0  # factor on the ratio of consecutive steps, from which the remaining step is estimated
     error_share: float = 0.5  # part of the tolerance that the remaining step, as estimated, may take
     cycle_tolerance: float = 1e-3  # relative difference below which two steps count as equal
     cycle_steps: int = 4  # equal steps in a row that count as a cycle
@@ -208,6 +210,23 @@ class Newton:
         """Return the changes of the surface's force along x and y (2, c) by `steps` of the skin (2 k, c)."""
         return self.condensed.stiffness.reshape(-1, 2, len(steps)).sum(axis=0) @ steps
 
+    def is_stable(self, state: EquilibriumState) -> bool:
+        """Return whether the energy grows with every small motion of a state that keeps its contact.
+
+        Touching nodes stay on the surface, and those that stick stay at their place. Friction forces are constant.
+        """
+        body, x = self.condensed, np.ascontiguousarray(state.skin_positions(self.condensed)[:, 0])
+        if not self.linearise(state, state.load, x, reuse=body.equilibrium is state.u) or not body.definite:
+            return False
+        free = np.column_stack([state.state != STICK, ~state.touching])
+        free &= (body.held[:, None] & [HELD_X, HELD_Y]) == 0
+        movable = np.flatnonzero(free)
+        try:
+            np.linalg.cholesky(body.stiffness[np.ix_(movable, movable)])
+        except LinAlgError:
+            return False
+        return True
+
     def apply_step(
         self, state: EquilibriumState, load: LoadState, skin: Array, anchor: Array, scale: float = 1.0
     ) -> tuple[EquilibriumState, float, int]:
@@ -296,7 +315,8 @@ class Newton:
             equal_steps = equal_steps + 1 if changes and abs(largest - last) <= CONTROL.cycle_tolerance * last else 0
             if equal_steps == CONTROL.cycle_steps:
                 raise NotConverged("states of contact come again and again")
-            remainder = min((2.0 * fall) ** 2 if not reuse else 4.0 * fall if new else 2.0 * fall, 1.0)
+            ratio = CONTROL.ratio_safety * fall
+            remainder = min(ratio**2 if not reuse else 2.0 * ratio if new else ratio, 1.0)
             accuracy = max(termination.tolerance * size, termination.relative_to_first * first)
             if largest * remainder < CONTROL.error_share * accuracy and not changes and scale == 1.0:
                 self.condensed.equilibrium = state.u

@@ -6,9 +6,10 @@ Also the transfer of a state to another mesh of the finger, where Newton's metho
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from threading import get_ident
 from time import perf_counter
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, Generic, Self, TypeVar, cast
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -34,6 +35,7 @@ from solver.scene.tables import Material, Materials, SceneError
 
 NO_ENERGY = 1e-14  # relative eigenvalue of an energy form below which it is left out [-]
 
+FingerKind = TypeVar("FingerKind", bound="Finger[Any]")
 PatchKind = TypeVar("PatchKind", bound=Patches, covariant=True)  # averages over endings at one kinematics
 
 
@@ -237,6 +239,16 @@ class FiniteFinger(Finger[FinitePatches]):
     def crosses(self, state: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
         return crosses_itself((self.geometry.mesh.nodes + state.u)[self.geometry.all_skin])
+
+
+def cached_finger(kind: type[FingerKind], scene: Scene, sizing: Sizing) -> FingerKind:
+    """Return the finger of `Finger.of`, kept for consecutive surfaces of one finger in one thread."""
+    return cast("FingerKind", _cached_finger(kind, scene, sizing, get_ident()))
+
+
+@lru_cache(maxsize=2)
+def _cached_finger(kind: type["Finger[Any]"], scene: Scene, sizing: Sizing, _thread: int) -> "Finger[Any]":
+    return kind.of(scene, sizing)
 
 
 KINDS: Mapping[str, type[Finger[Any]]] = {"small": LinearFinger, "finite": FiniteFinger}  # by kinematics

@@ -8,6 +8,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import ceil
+from threading import get_ident
 from typing import NamedTuple
 
 import numpy as np
@@ -240,14 +241,14 @@ def tissue_of(scene: Scene, finger: Finger[Patches]) -> Tissue:
     if isinstance(finger, FiniteFinger):
         return FiniteTissue(finger.body, relaxing_laws(scene.materials), finger.ending_and_midpoint)
     assert isinstance(finger, LinearFinger)
-    body = copy(_relaxing_body(finger.geometry.mesh, scene.materials))
+    body = copy(_relaxing_body(finger.geometry.mesh, scene.materials, get_ident()))
     body.reset()
     return LinearTissue(body, finger.ending_and_midpoint.endings)
 
 
 @lru_cache(maxsize=1)
-def _relaxing_body(mesh: Mesh, materials: Materials) -> RelaxingBody:
-    """Return the relaxing body of a mesh, cached for consecutive load paths."""
+def _relaxing_body(mesh: Mesh, materials: Materials, _thread: int) -> RelaxingBody:
+    """Return the relaxing body of a mesh, cached for consecutive load paths in one thread."""
     return RelaxingBody(mesh, relaxing_laws(materials), checked=True)
 
 

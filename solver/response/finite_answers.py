@@ -19,7 +19,7 @@ from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import end, march
 from solver.equilibrium.load_stepping import forces_of, sliding_load
 from solver.equilibrium.relaxation import CondensedRelaxing
-from solver.failures import CutFolds, NoSteadyState, NotConverged, SolveFailure
+from solver.failures import WRINKLES, Folds, NoSteadyState, NotConverged, SolveFailure
 from solver.mesh import Lines
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
@@ -202,6 +202,8 @@ def solve_nested(
 
     `steps` are the load steps taken where the state depends on its load path. Raises Cancelled.
     """
+    if not top.finger.newton.is_stable(top.state):
+        return Folds(WRINKLES), steps
     start = _starting_solution(scene, replace(top.sizing, halved=True), top, meshes)
     finger = start.finger
     try:
@@ -214,7 +216,7 @@ def solve_nested(
             steps = None
             state = slide_near(finger, scene, start.state) or settled_state(finger, scene, start.state)
         order = order_of(finger, state)
-    except CutFolds as failure:
+    except Folds as failure:
         return failure, steps
     except SolveFailure:
         return NO_NESTED_STATE, steps
@@ -267,8 +269,8 @@ def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float)
     setup = nested.coarse.setup_s + top.setup_s
     if scene.solve.course == "history":
         step_factor = steps_of_press(scene, nested.coarse.finger) if steps is None else steps.factor
-        for leg in scene.earlier_slides():  # one that never settles is refused with its limits
-            settled_state(finger, leg)
+        for slide in scene.earlier_slides():  # one that never settles is refused with its limits
+            settled_state(finger, slide)
         path = march(scene, finger, step_factor, relaxing=scene.materials.relax)
         state = path.last
     if not state.touching.any():

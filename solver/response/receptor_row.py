@@ -17,7 +17,7 @@ from solver.body.linear import Elastic, LinearPatches
 from solver.body.receptor import endings
 from solver.continuation.finite_states import rough_state
 from solver.continuation.limit_point import is_sound
-from solver.continuation.small_states import WIDE_MARGIN, expected_depth, nearest_state, proven_state
+from solver.continuation.small_states import WIDE_MARGIN, expected_depth, nearest_state, state_on_branch
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger, finite_laws, settled_moduli
 from solver.equilibrium.load_path import end
@@ -142,7 +142,7 @@ def _sound_state(finger: Finger[Any], scene: Scene, near: EquilibriumState | Non
         usable = is_sound(finger, state)
     else:
         assert isinstance(finger, LinearFinger)
-        state = proven_state(scene, finger)
+        state = state_on_branch(scene, finger)
         usable = not finger.reaches_out(state, finger.displacement(state), state.load.depth)
     if usable:
         return state

@@ -19,9 +19,9 @@ from solver.continuation.small_states import (
     WIDE_MARGIN,
     is_unstable_under_force,
     nearest_state,
-    proven_state,
     refuse_beyond_tissue,
     remove_round_off,
+    state_on_branch,
 )
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import LinearFinger
@@ -120,16 +120,16 @@ class SmallMeshing(Meshing):
         """
         start = perf_counter()
         history = scene.solve.course == "history"
-        for leg in scene.earlier_slides() if history else ():
-            proven_state(leg, finger)
-        steady = proven_state(scene, finger)
+        for slide in scene.earlier_slides() if history else ():
+            state_on_branch(slide, finger)
+        steady = state_on_branch(scene, finger)
         try:
             steps = choose_steps(scene, finger, settled=steady)
             step_factor = steps_of_press(scene, finger) if steps is None else steps.factor
         except SolveFailure:
             steps, step_factor = Steps(1, np.zeros(COUNT), np.zeros(COUNT)), 1  # there will be no estimate either
         if step_factor > 1 and steps is not None:
-            steady = proven_state(scene, finger, step_factor)
+            steady = state_on_branch(scene, finger, step_factor)
         path, state, relaxing = None, steady, history and scene.materials.relax
         if history:
             progress = self.progress

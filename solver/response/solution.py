@@ -15,10 +15,10 @@ from solver.accuracy.residual_overstress import with_viscosity
 from solver.continuation.small_states import expected_depth
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
-from solver.failures import CutFolds, NotConverged, SolveFailure
+from solver.failures import Folds, NotConverged, SolveFailure
 from solver.mesh import Lines
 from solver.mesh.mesher import FingerMesh
-from solver.prediction import Prediction
+from solver.prediction import Prediction, percent
 from solver.progress import Progress, interruptible, report_progress
 from solver.response.answer import FIRST_FINENESS, Answer, Meshing, Watch
 from solver.response.finite_answers import FiniteMeshing
@@ -28,7 +28,7 @@ from solver.scene import Scene
 LIMIT_ACCURACY = 0.03  # relative, of a friction limit
 USABLE_ESTIMATE = 0.1  # largest error estimate with which a coarser mesh's answer near a limit is still given
 NEAR_LIMIT = "That mesh ends settled sliding at mu = {:.3g}, which is known to {:.0f} %: this state may lie beyond."
-TOLERANCE_MISSED = "The finest mesh leaves an error estimate above the tolerance asked for."
+TOLERANCE_MISSED = "The finest mesh leaves an error estimate above the tolerance, {}."
 # Of a mesh on which a scene without a state on the first is solved once more: 8 refuses the same of 316 scenes.
 LIMIT_FINENESS = 6.0
 FINENESS_RATIO = 1.2  # to the next mesh that is tried where one mesh may have no state by chance
@@ -112,11 +112,11 @@ def _with_evidence(prediction: Answer, progress: Progress | None) -> Answer:
 def _with_earlier_slides(prediction: Prediction, solve: Answers) -> Prediction:
     """Return a prediction with a warning for each earlier slide that has no settled state on a coarse mesh."""
     earlier = prediction.scene.earlier_slides() if prediction.scene.solve.course == "steady" else ()
-    coarse = [replace(leg, solve=replace(leg.solve, tolerance=COARSE, evidence="estimated")) for leg in earlier]
-    failures = [leg for leg in solve(coarse) if isinstance(leg, SolveFailure)] if coarse else []
+    coarse = [replace(slide, solve=replace(slide.solve, tolerance=COARSE, evidence="estimated")) for slide in earlier]
+    failures = [slide for slide in solve(coarse) if isinstance(slide, SolveFailure)] if coarse else []
     sentences = (
-        f"A slide before this one, the other way, has no settled state that it could come from: {leg}"
-        for leg in failures
+        f"A slide before this one, the other way, has no settled state that it could come from: {slide}"
+        for slide in failures
     )
     return replace(prediction, warnings=(*prediction.warnings, *sentences))
 
@@ -320,7 +320,7 @@ def _sentences(
 ) -> tuple[str, ...]:
     """Return the warnings of an answer from the finest mesh."""
     warnings: list[str] = []
-    if isinstance(failure, CutFolds):
+    if isinstance(failure, Folds):
         warnings.append(f"This is a coarse mesh's answer, and its error estimate: on finer ones {failure}.")
     elif failure is not None:
         warnings.append("A finer mesh did not find this state: this is the coarser one's, and its error estimate.")
@@ -328,8 +328,8 @@ def _sentences(
             warnings.append(NEAR_LIMIT.format(failure.limit_mu, 100.0 * LIMIT_ACCURACY))
     if isinstance(answer, Prediction) and answer.unknown is not None:
         warnings.append(f"How far this is off is not known, since {answer.unknown}.")
-    elif error > 1.0 and isinstance(answer, Prediction) and answer.scene.solve.tolerance is not None:
-        warnings.append(TOLERANCE_MISSED)
+    elif error > 1.0 and isinstance(answer, Prediction) and (target := answer.scene.solve.target) is not None:
+        warnings.append(TOLERANCE_MISSED.format(percent(target)))
     if isinstance(answer, Prediction):
         warnings += trial_warnings(answer.scene, answer.indentation)
     if contrast is not None and contrast.warning:
@@ -364,7 +364,7 @@ def _error_by_tolerance(answer: Answer, *, on_first: bool) -> float:
     """
     if isinstance(answer, SolveFailure) and on_first:
         return ASSUMED_ERROR
-    if not isinstance(answer, Prediction) or isinstance(answer.unknown, CutFolds):
+    if not isinstance(answer, Prediction) or isinstance(answer.unknown, Folds):
         return 0.0
     if answer.nested is None:
         return ASSUMED_ERROR

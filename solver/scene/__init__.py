@@ -12,6 +12,7 @@ from solver.scene.tables import (
     Finger,
     Friction,
     Loading,
+    Material,
     Materials,
     Receptor,
     SceneError,
@@ -67,9 +68,8 @@ class Scene:
             raise SceneError("loading.tangential_force", drag, allowed)
 
     def _check_stiffnesses(self) -> None:
-        tissues = TISSUES if self.finger.bone == "meshed" else TISSUES[:-1]
-        softest = min(self.materials.of(name).E for name in tissues)
-        for name in tissues:
+        softest = min(tissue.E for tissue in self.meshed_tissues)
+        for name in TISSUES[: len(self.meshed_tissues)]:
             if not STIFFNESSES * softest * (1.0 + 1e-9) >= self.materials.of(name).E:
                 allowed = f"it must be at most {STIFFNESSES:g} times that of the softest tissue, {softest:g} MPa"
                 raise SceneError(f"materials.{name}.E", self.materials.of(name).E, allowed)
@@ -85,6 +85,11 @@ class Scene:
         if self.finger.bone == "rigid" and self.materials.bone.prony:
             allowed = 'a rigid bone does not relax: leave it out, or set finger.bone = "meshed"'
             raise SceneError("materials.bone.prony", [(t.g, t.tau) for t in self.materials.bone.prony], allowed)
+
+    @property
+    def meshed_tissues(self) -> tuple[Material, ...]:
+        """The tissues that have elements: without a rigid bone."""
+        return self.materials.by_region if self.finger.bone == "meshed" else self.materials.by_region[:-1]
 
     @property
     def normal_force(self) -> float | None:
@@ -117,8 +122,8 @@ class Scene:
 
     def frictionless_press(self, depth: float) -> "Scene":
         """Return the scene of the finger pressed to a `depth` [mm] without friction: meshes depend on nothing else."""
-        bare = replace(self, title="", friction=Friction(0.0), loading=Loading(depth))
-        return replace(bare, solve=Solve(self.solve.kinematics))
+        frictionless = replace(self, title="", friction=Friction(0.0), loading=Loading(depth))
+        return replace(frictionless, solve=Solve(self.solve.kinematics))
 
     def without_drag(self) -> "Scene":
         """Return the scene that slides on, in place of a prescribed drag."""

@@ -57,8 +57,8 @@ _LARGEST = sys.float_info.max
 
 
 def _lies_within(value: object, low: float, high: float) -> bool:
-    """Return whether `value` is a number in this range; nan and strings are not."""
-    return isinstance(value, int | float) and low <= value <= high
+    """Return whether `value` is a number in this range; nan, strings, True and False are not."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high
 
 
 def _are_two_within(values: object, low: float, high: float) -> bool:

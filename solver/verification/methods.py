@@ -11,7 +11,7 @@ import numpy as np
 from solver.arrays import Array
 from solver.body.linear import LinearBody
 from solver.contact import LoadState
-from solver.continuation.existence import proven_slide
+from solver.continuation.existence import slide_on_branch
 from solver.continuation.finite_states import rough_state
 from solver.continuation.small_states import settled_state
 from solver.equilibrium import EquilibriumState
@@ -101,7 +101,7 @@ class FiniteMethod(MeshMethod[FiniteFinger]):
         if before is None:
             with suppress(SolveFailure):  # with steep friction the skin may fold on the coarse mesh alone
                 before = self.finger.transfer(rough_state(self._coarse, scene), self._coarse)
-        return proven_slide(self.finger, sliding_load(scene), start=before)
+        return slide_on_branch(self.finger, sliding_load(scene), start=before)
 
     def floor(self) -> float:
         """Time one assembly, factorisation and solve."""

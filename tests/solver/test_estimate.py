@@ -7,7 +7,7 @@ import pytest
 
 from solver import Finger, Friction, Loading, Material, Materials, Receptor, Relaxation, Scene, Solve, solve
 from solver.accuracy.convergence_order import trial_warnings
-from solver.accuracy.error_estimate import errors
+from solver.accuracy.error_estimate import errors, half_width
 from solver.continuation.small_states import expected_depth, nearest_state, settled_state
 from solver.equilibrium import EQUILIBRIUM
 from solver.equilibrium.finger import LinearFinger
@@ -92,8 +92,23 @@ def test_an_error_that_falls_with_the_square_of_an_element_is_known_and_edges_ad
     with_edges = errors(sliding, truth * (1.0 + error), replace(nested, edge_changes=edges), None)
     assert with_edges.sed - estimate.sed == pytest.approx(0.01 / 3.0 / 1.04, rel=1e-12)
     assert with_edges.corrected - estimate.corrected == pytest.approx(0.01 / 3.0 / 1.01, rel=1e-12)
-    assert with_edges.width - estimate.width == pytest.approx(0.005 / 1.04, rel=1e-12)  # it follows an edge by a line
+    assert with_edges.width - estimate.width == pytest.approx(0.01 / 1.04, rel=1e-12)  # it follows an edge by a line
     assert with_edges.responses - estimate.responses == pytest.approx(0.01 / 3.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0])
+def test_errors_of_any_order_and_edges_at_any_place_lie_below_the_estimate_and_some_come_near(order):
+    rng, largest = np.random.default_rng(5), 0.0
+    for _ in range(20000):
+        series, edge = rng.normal(), rng.exponential()  # error on the mesh but for edges; change as one moves by a node
+        on_mesh, on_nested = (
+            edge * rng.uniform() ** 2,
+            edge * (rng.uniform() / 2.0) ** 2,
+        )  # a node away, half a node away
+        value, nested = series + on_mesh, series / 2.0**order + on_nested
+        bound = half_width(np.array(nested - value), np.array([edge]), order)
+        largest = max(largest, abs(value) / bound, abs(nested) / (bound - abs(nested - value)))
+    assert 0.9 < largest <= 1.0 + 1e-12
 
 
 def test_the_sed_follows_an_edge_of_contact_by_a_parabola_about_a_place_within_half_a_node():
@@ -167,6 +182,24 @@ def test_at_finite_strain_estimates_see_layers_in_the_fat_and_the_bound_at_the_e
 
 
 STICKS_LEAST = 0.0096274  # SED of stickiness 0, on meshes of 17, 23 and 26 with lines at the edges of contact
+
+
+@pytest.mark.parametrize("tolerance", [0.003, None])
+def test_a_tolerance_that_is_missed_is_named_whether_it_was_asked_for_or_not(tolerance):
+    tiny = Scene(
+        friction=Friction(0.3), loading=Loading(1e-6, "+x"), solve=Solve(tolerance=tolerance, evidence="quick")
+    )
+    answer = solve(tiny)
+    assert answer.error_estimate > 0.003
+    assert "The finest mesh leaves an error estimate above the tolerance, 0.3 %." in answer.warnings
+
+
+def test_the_law_of_a_bone_without_elements_changes_nothing():
+    sliding = Scene(friction=Friction(0.2), loading=Loading(0.5), solve=Solve("finite", evidence="quick"))
+    bone = replace(sliding.materials.bone, law="ogden")
+    other = solve(replace(sliding, materials=replace(sliding.materials, bone=bone)))
+    usual = solve(sliding)
+    assert (other.sed_ending, other.error_estimate) == (usual.sed_ending, usual.error_estimate)
 
 
 def test_a_bound_far_from_the_edges_of_contact_keeps_no_tolerance_from_being_met():

@@ -7,7 +7,7 @@ import pytest
 
 from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState, Receptor, Scene, Solve, solve
 from solver.contact import LoadState
-from solver.continuation.existence import proven_slide
+from solver.continuation.existence import slide_on_branch
 from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_stepping import march, solve_full_slip
 from solver.mesh.mesher import Sizing
@@ -76,7 +76,7 @@ def test_four_surfaces_have_no_settled_sliding_at_two_millimetres_and_the_refusa
     mu, tau, deepest
 ):
     with pytest.raises(NoSteadyState, match="folds") as refusal:
-        proven_slide(published(8), LoadState(2.0, mu, tau, TOWARDS_TIP))
+        slide_on_branch(published(8), LoadState(2.0, mu, tau, TOWARDS_TIP))
     assert refusal.value.limit_mu == pytest.approx(0.373, rel=0.03)
     assert refusal.value.limit_indentation == pytest.approx(deepest, rel=0.03)
 
@@ -84,20 +84,20 @@ def test_four_surfaces_have_no_settled_sliding_at_two_millimetres_and_the_refusa
 def test_a_sound_state_is_the_direct_one():
     finger = published(5)
     load = LoadState(1.5, 0.44, 0.03009, 1)
-    state = proven_slide(finger, load)
+    state = slide_on_branch(finger, load)
     np.testing.assert_array_equal(state.u, solve_full_slip(finger.newton, load).u)
 
 
 def test_friction_without_measure_is_the_bound_alone():
     finger = published(6)
-    sed = [finger.sed_ending(proven_slide(finger, LoadState(1.0, mu, 0.005, 1)).u) for mu in (50.0, 1000.0)]
+    sed = [finger.sed_ending(slide_on_branch(finger, LoadState(1.0, mu, 0.005, 1)).u) for mu in (50.0, 1000.0)]
     assert sed[0] == pytest.approx(sed[1], rel=1e-3)
 
 
 def test_a_bound_next_to_nothing_leaves_the_frictionless_state_whatever_the_coefficient():
     finger = published(5)
     sed = [
-        finger.sed_ending(proven_slide(finger, LoadState(1.0, mu, tau, 1)).u)
+        finger.sed_ending(slide_on_branch(finger, LoadState(1.0, mu, tau, 1)).u)
         for mu, tau in ((0.0, np.inf), (1000.0, 1e-9))
     ]
     assert sed[0] == pytest.approx(sed[1], rel=1e-6)
@@ -107,7 +107,7 @@ def test_a_bound_next_to_nothing_leaves_the_frictionless_state_whatever_the_coef
 @pytest.mark.parametrize(("depth", "tau", "sense"), [(0.01, 0.003, -1), (1e-6, 0.005, -1), (0.1, 0.01, 1)])
 def test_skin_that_nearly_all_slips_at_the_bound_drags_with_the_bound_on_all_that_touches(depth, tau, sense, fineness):
     finger = published(fineness, depth)
-    state = proven_slide(finger, LoadState(depth, 1000.0, tau, sense))
+    state = slide_on_branch(finger, LoadState(depth, 1000.0, tau, sense))
     touching = np.flatnonzero(state.touching)
     x = state.skin_positions(finger.newton.condensed)[:, 0]
     longest = x[min(touching[-1] + 1, len(x) - 1)] - x[max(touching[0] - 1, 0)]  # to the neighbours that do not touch
@@ -116,7 +116,7 @@ def test_skin_that_nearly_all_slips_at_the_bound_drags_with_the_bound_on_all_tha
 
 @pytest.mark.parametrize("depth", [1e-6, 1e-4, 1e-2])
 def test_a_finger_that_barely_touches_has_an_answer(depth):
-    state = proven_slide(published(5), LoadState(depth, 0.5, 0.01, 1))
+    state = slide_on_branch(published(5), LoadState(depth, 0.5, 0.01, 1))
     assert state.touching.any()
     assert state.force[1] > 0.0
 

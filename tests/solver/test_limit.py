@@ -18,7 +18,7 @@ from tests.solver.finite_examples import published
 
 SLOW = pytest.mark.slow
 TOWARDS_TIP = -1  # the bone goes along +x, so the surface pulls the skin along -x
-KINK_STRETCH = [(1.8, 69.4, (0.1525, 0.0775, 0.0303)), (1.73, 65.9, (0.1198, 0.0576, 0.0306))]  # drawn at random
+SQUEEZED = [(1.8, 69.4, (0.1525, 0.0775, 0.0303)), (1.73, 65.9, (0.1198, 0.0576, 0.0306))]  # drawn at random
 
 
 def squeezed_scene(depth, angle, tissues):
@@ -61,7 +61,7 @@ def test_depth_has_the_limit_that_another_code_found(mu, tau, largest):
 
 
 @SLOW
-@pytest.mark.parametrize(("depth", "angle", "tissues"), KINK_STRETCH)
+@pytest.mark.parametrize(("depth", "angle", "tissues"), SQUEEZED)
 def test_where_skin_folds_at_one_place_both_limits_are_those_of_a_mesh_of_half_the_size(
     depth, angle, tissues, monkeypatch
 ):
@@ -152,8 +152,8 @@ def test_no_limit_of_friction_is_told_where_growing_depth_arrives_beyond_it(monk
     monkeypatch.setattr(existence, "friction_limit", lambda *_: branch_end)
     monkeypatch.setattr(existence, "depth_limit", by_depth)
     with pytest.raises(NotConverged, match=r"followed up to mu = 0\.373 and lost there"):
-        existence.proven_slide(FiniteFinger.of(scene, mesher.Sizing(5.0, 2.0)), load)
+        existence.slide_on_branch(FiniteFinger.of(scene, mesher.Sizing(5.0, 2.0)), load)
     monkeypatch.setattr(existence, "depth_limit", lambda *_: replace(branch_end, value=1.5))
     with pytest.raises(NoSteadyState) as refusal:
-        existence.proven_slide(FiniteFinger.of(scene, mesher.Sizing(5.0, 2.0)), load)
+        existence.slide_on_branch(FiniteFinger.of(scene, mesher.Sizing(5.0, 2.0)), load)
     assert (refusal.value.limit_mu, refusal.value.limit_indentation) == (0.373, 1.5)

@@ -28,6 +28,7 @@ from solver.scene.published import SLIPPERINESS, STICKINESS, scene, scenes
             "materials.bone.prony",
         ),
         (lambda: Friction(-0.1), "friction.mu"),
+        (lambda: Friction(True), "friction.mu"),
         (lambda: Friction(0.3, -1.0), "friction.tau_max"),
         (lambda: Friction(math.inf), "friction.mu"),
         (lambda: Loading(0.0), "loading.indentation"),

@@ -292,6 +292,7 @@ def balanced_or_refused(depth, mu, bound, slide, angle, nu, course):
 def test_a_run_can_be_stopped():
     with pytest.raises(Cancelled):
         solve_many(scenes(), progress=lambda part: part < 0.35)
+    assert len(solve_many(scenes()[:1], progress=lambda _: None)) == 1  # a listener that returns nothing stops nothing
 
 
 def test_a_prediction_is_told_as_plain_data_with_all_the_contract_asks_for(ten, histories):
@@ -325,8 +326,7 @@ def test_what_was_left_out_comes_with_numbers_of_this_scene(ten):
     for name, entry in sticky.items():
         assert set(entry) == {"estimate", "from", "how"}
         assert entry["estimate"] is None or entry["estimate"] >= 0.0
-        assert entry["from"] != slippery[name]["from"]
-    assert sticky["inertia"]["estimate"] < 1e-3
+        assert entry["from"] != slippery[name]["from"] or name == "inertia"  # which a settled slide has none of
     assert 1e-5 < sticky["bone compliance"]["estimate"] < 1e-2
 
 
