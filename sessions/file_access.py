@@ -154,6 +154,30 @@ def write_whole(path: Path, content: bytes) -> None:
         raise
 
 
+class NotOurs(Exception):
+    """A file that would be written over is not ours: which one, what to do."""
+
+
+_MARKED = 3  # lines at the head of a file: in our pictures the mark is in the third
+_HEAD = 4096  # bytes that hold them
+
+
+def check_replaceable(path: Path, mark: str, *companions: Path) -> None:
+    """Raise NotOurs where a file that would be written over is not ours: no line at its head begins with `mark`.
+
+    `companions` are written after it and bear no mark: they are ours where it is.
+    """
+    head = b""
+    if path.is_file() or path.is_dir():
+        with name_failure(NotOurs, f"{path} cannot be written over"), path.open("rb") as file:
+            head = file.read(_HEAD)
+    if any(line.startswith(mark.encode()) for line in head.splitlines()[:_MARKED]):
+        return
+    for file in (*([path] if head else []), *companions):
+        if file.exists():
+            raise NotOurs(f"{file} holds something else, so it is left alone: choose another file or folder")
+
+
 def holds_something(folder: Path) -> bool:
     """Say whether a new folder would replace something at `folder`."""
     return folder.exists() and (not folder.is_dir() or any(folder.iterdir()))

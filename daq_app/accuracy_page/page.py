@@ -303,13 +303,13 @@ def page(results: RunResults, figures: Mapping[str, Plate] | None = None) -> str
 def write(results: RunResults, folder: Path) -> tuple[Path, ...]:
     """Write page, pictures and data to `folder`; return the files. Raises ReportError if that fails."""
     data = folder / DATA
+    figures = plates(results)
+    swap_in(folder / PAGE, page(results, figures))  # first: it shows that the others are ours
     swap_in(data, json.dumps(results.to_dict(), indent=1, allow_nan=False) + "\n")
     paths = [data]
-    figures = plates(results)
     for plate in figures.values():
         for panel in plate.panels:
             path = folder / FIGURES / f"{panel.name}.svg"
             swap_in(path, panel.svg)
             paths.append(path)
-    swap_in(folder / PAGE, page(results, figures))
     return (folder / PAGE, *paths)

@@ -64,16 +64,6 @@ def _store(folder: Path, name: str, content: bytes) -> Path:
     return path
 
 
-def check_replaceable(path: Path, heading: str) -> None:
-    """Raise RecordingError where a file named for a text holds something else.
-
-    Such a text begins with the line `heading`, alone or after a line that says SIMULATED.
-    """
-    content = bytes_of(path)
-    if content and heading.encode() not in content.split(b"\n", 2)[:2]:
-        raise RecordingError(f"{path} holds something else, so it is left alone: choose another file")
-
-
 GAIN_ERROR = "calibration-error.json"
 _LARGEST = 0.2  # that may be set [-]
 

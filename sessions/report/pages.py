@@ -16,13 +16,14 @@ from markupsafe import Markup
 
 from sessions.exchange.csv_text import write_rows
 from sessions.exchange.session_tables import heading
-from sessions.file_access import remedy, write_whole
+from sessions.file_access import check_replaceable, remedy, write_whole
 from sessions.prediction import QUANTITIES, SED
 from sessions.report import study_prose
 from sessions.report.contents import Report
 from sessions.report.facts import versions
 from sessions.report.figures import Panel, Plate, plates
 from sessions.report.figures.relation import study_plates
+from sessions.report.figures.style import SVG_MARK
 from sessions.report.prose import distinctions, doubts, question, summary
 from sessions.report.tables import split_off_appendix
 from sessions.report.tables.session import tables as session_tables
@@ -89,36 +90,33 @@ def _page(file: str, drawings: Iterable[Plate], notice: str, **values: object) -
 def write_report(report: Report, path: Path, drawings: Sequence[Plate] | None = None) -> None:
     """Write the page to `path`: a new file, then swapped in, so that readers see the old page or the new one.
 
-    Raises ReportError when that cannot be done, or when `path` holds something that is no page.
+    Raises ReportError when that cannot be done, and NotOurs when `path` holds something that is no page.
     """
-    check_replaceable(path)
+    check_place(path)
     swap_in(path, page(report, drawings))
 
 
-def check_replaceable(path: Path) -> None:
-    """Raise ReportError where a page would replace something that is none of ours, or has no place."""
+def check_place(path: Path, *companions: Path) -> None:
+    """Raise ReportError where a page has no place, and NotOurs where it or its companions would replace others'."""
     make_place(path.parent)
-    if not path.exists():
-        return
-    try:
-        with path.open("rb") as file:
-            start = file.read(len(_DOCTYPE))
-    except OSError as error:
-        raise ReportError(f"{path} cannot be written over ({error.strerror}): choose another file") from error
-    if start not in (b"", _DOCTYPE.encode()):
-        raise ReportError(f"{path} holds something that is no report, so it is left alone: choose another file")
+    check_replaceable(path, _DOCTYPE, *companions)
 
 
 def write_figures(report: Report, folder: Path, drawings: Sequence[Plate] | None = None) -> tuple[Path, ...]:
-    """Write every picture of the report to `folder` as SVG, each with its numbers as CSV; return the files."""
-    paths: list[Path] = []
+    """Write every picture of the report to `folder` as SVG, each with its numbers as CSV; return the files.
+
+    Raises ReportError, and NotOurs before any is written.
+    """
+    files: dict[Path, str] = {}
     for plate in plates(report) if drawings is None else drawings:
         for panel in plate.panels:
-            for suffix, text in ((".svg", panel.svg), (".csv", panel_csv(panel, report.head))):
-                path = folder / (re.sub(r"[^0-9A-Za-z_-]", "-", panel.name) + suffix)  # a name any file system takes
-                swap_in(path, text)
-                paths.append(path)
-    return tuple(paths)
+            name = re.sub(r"[^0-9A-Za-z_-]", "-", panel.name)  # one that any file system takes
+            picture, numbers = folder / f"{name}.svg", folder / f"{name}.csv"
+            check_replaceable(picture, SVG_MARK, numbers)
+            files |= {picture: panel.svg, numbers: panel_csv(panel, report.head)}
+    for path, text in files.items():
+        swap_in(path, text)
+    return tuple(files)
 
 
 def embed(panel: Panel) -> Markup:

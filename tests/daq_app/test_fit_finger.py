@@ -8,10 +8,10 @@ from finger_presses import law
 
 from daq_app.cli.main import run
 from daq_app.cli.verbs.fit_finger import SCENE_HEAD
+from sessions.file_access import check_replaceable
 from sessions.prediction import finger_in
 from sessions.prediction.finger_fit import FingerFit, Interval, LayerFit
 from sessions.prediction.press_model import LAYERS, Check, PressModel
-from sessions.recording.derived import check_replaceable
 from solver import Friction, Loading, Scene
 
 STIFFNESSES = (0.25, 0.1, 0.025)  # [MPa]

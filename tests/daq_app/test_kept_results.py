@@ -88,6 +88,47 @@ def test_the_afferent_stays_with_the_prediction_and_what_is_not_asked_for_again_
     assert [trial["rate"] for trial in document["trials"]] == [trial["rate"] for trial in afferent["trials"]]
 
 
+@pytest.mark.parametrize("name", ["study.html", "trials.csv", "study.json", "rivals.csv"])
+def test_a_study_writes_over_no_file_of_somebody_else(small, tmp_path, capsys, name):
+    out = tmp_path / "results"
+    out.mkdir()
+    (out / name).write_text("mine\n")
+    assert run(["study", str(small.parent), "--out", str(out)]) == 1
+    assert f"{out / name} holds something else" in capsys.readouterr().err
+    assert [(file.name, file.read_text()) for file in out.iterdir()] == [(name, "mine\n")]  # before hours of work
+
+
+def test_a_study_replaces_its_own_files_and_no_other(small, tmp_path):
+    (tmp_path / "results").mkdir()
+    (tmp_path / "results" / "notes.txt").write_text("mine\n")
+    for _ in range(2):
+        assert run(["study", str(small.parent), "--out", str(tmp_path / "results"), "--workers", "1"]) == 0
+    assert (tmp_path / "results" / "notes.txt").read_text() == "mine\n"
+
+
+def test_pictures_of_a_report_are_written_over_no_file_of_somebody_else(small, tmp_path, capsys):
+    figures = tmp_path / "figures"
+    words = ["report", str(small), "-o", str(tmp_path / "page.html"), "--figures", str(figures)]
+    for name in ("course.svg", "course.csv"):
+        figures.mkdir()
+        (figures / name).write_text("<svg >mine</svg>\n")
+        assert run(words) == 1
+        assert f"{figures / name} holds something else" in capsys.readouterr().err
+        assert [(file.name, file.read_text()) for file in figures.iterdir()] == [(name, "<svg >mine</svg>\n")]
+        assert not (tmp_path / "page.html").exists()
+        shutil.rmtree(figures)
+    for _ in range(2):
+        assert run(words) == 0
+
+
+@pytest.mark.parametrize("name", ["accuracy.html", "accuracy.json", "figures"])
+def test_the_accuracy_page_is_written_over_no_file_of_somebody_else(tmp_path, capsys, name):
+    (tmp_path / name).write_text("mine\n")
+    assert run(["accuracy", "--quick", "--out", str(tmp_path)]) == 1
+    assert f"{tmp_path / name} holds something else" in capsys.readouterr().err
+    assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [(name, "mine\n")]
+
+
 def test_an_analysis_of_odd_parts_is_refused_in_a_sentence_and_made_anew_where_that_is_asked_for(small, capsys):
     (small / "analysis.json").write_text('{"strokes": [], "friction": [], "flaws": [], "bootstrap": 7}')
     assert run(["export", str(small), "--format", "csv", "--out", str(small.parent / "out")]) == 1

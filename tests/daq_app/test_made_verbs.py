@@ -147,7 +147,7 @@ def test_a_report_is_one_page_that_says_simulated_listed_in_the_manifest_and_kee
     assert "SIMULATED" in text
     capsys.readouterr()
     assert run(["report", str(session), "-o", str(session / "session.sqlite")]) == 1
-    assert "holds something that is no report" in capsys.readouterr().err.splitlines()[0]  # before anything is solved
+    assert "holds something else" in capsys.readouterr().err.splitlines()[0]  # before anything is solved
     assert "<script" not in text
     assert "http://" not in text.replace("http://www.w3.org/", "")
     assert run(["verify", str(session)]) == 0

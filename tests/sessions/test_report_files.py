@@ -3,6 +3,7 @@
 import pytest
 from report_example import bare
 
+from sessions.file_access import NotOurs
 from sessions.report.pages import ReportError, write_report
 
 
@@ -17,7 +18,7 @@ def test_writing_replaces_an_older_page_and_leaves_nothing_beside_it(tmp_path):
 def test_a_file_that_is_no_report_is_left_alone(tmp_path):
     path = tmp_path / "session.sqlite"
     path.write_bytes(b"SQLite format 3\x00")
-    with pytest.raises(ReportError, match="is no report"):
+    with pytest.raises(NotOurs, match="holds something else"):
         write_report(bare(), path)
     assert path.read_bytes() == b"SQLite format 3\x00"
 

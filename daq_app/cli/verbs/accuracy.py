@@ -29,11 +29,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    from daq_app.accuracy_page.page import PAGE, tables, write
-    from sessions.report.pages import make_place
+    from daq_app.accuracy_page.page import DATA, FIGURES, PAGE, tables, write
+    from sessions.report.pages import check_place
 
     console.progress(0.0, "loading")
-    make_place(options.out)  # fails before three minutes are spent
+    check_place(options.out / PAGE, options.out / DATA, options.out / FIGURES)  # fails before three minutes are spent
     _docs(options, {})
     results = _measure_or_restore(options, console)
     if results.stopped:

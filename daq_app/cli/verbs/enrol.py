@@ -11,11 +11,10 @@ from typing import Any
 
 from daq_app.cli.options import add_body_arguments, add_seed, body_of
 from daq_app.console import DONE, Console, WrongValue, table
-from sessions.file_access import write_whole
+from sessions.file_access import check_replaceable, write_whole
 from sessions.plan import study as studies
 from sessions.plan.protocols.protocol import protocol_file
 from sessions.plan.study import Member, Study, StudyError
-from sessions.recording.derived import check_replaceable
 from sessions.toml_file import text_of
 
 EXAMPLE = "daq-app enrol studies/friction --subject P07 --finger tip_radius=6.5 contact_angle=40"

@@ -18,7 +18,7 @@ from daq_app.cli.options import add_calibration, add_flag, add_number, add_seed,
 from daq_app.console import DONE, FLAWED, Console, WrongValue, table
 from daq_app.wording import number, span
 from sessions.exchange.csv_text import displacement_log
-from sessions.file_access import write_whole
+from sessions.file_access import check_replaceable, write_whole
 from sessions.plan.plan import SessionPlan
 from sessions.prediction import PredictionOptions, finger_in, with_own_finger
 from sessions.prediction.finger_fit import FingerFit, Interval, fit
@@ -27,7 +27,6 @@ from sessions.prediction.press_curves import PressCurves, deepest, press_curves
 from sessions.prediction.press_model import LAYERS, Check, FitError, check, press_model
 from sessions.prediction.relaxation_fit import RelaxationFit, relaxing_fit
 from sessions.recording import Recording
-from sessions.recording.derived import check_replaceable
 from sessions.strokes import AnalysisSettings
 from sessions.toml_file import toml_text
 from solver import Scene

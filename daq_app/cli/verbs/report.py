@@ -57,7 +57,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from sessions.report import pages
 
     if options.out is not None:
-        pages.check_replaceable(options.out)
+        pages.check_place(options.out)
     else:
         pages.make_place(recording.folder)
     if options.figures is not None:
@@ -82,12 +82,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
     report = findings(recording, analysis, prediction, [score_table(visit) for visit in score_only], further=further)
     console.progress(0.9, "drawing")
     drawings = pages.plates(report)
+    pictures = pages.write_figures(report, options.figures, drawings) if options.figures else ()
     if options.out is None:  # in the session's folder it is a derived file, listed in the manifest
         page = store_page(recording.folder, _PAGE, pages.page(report, drawings))
     else:
         page = options.out
         pages.write_report(report, page, drawings)
-    pictures = pages.write_figures(report, options.figures, drawings) if options.figures else ()
     console.result({"page": str(page), "pictures": [str(path) for path in pictures], "flaws": len(report.flaws)})
     console.say(f"{page}{' (SIMULATED)' if report.simulated else ''}")
     return FLAWED if analysis.flawed or unreadable else DONE

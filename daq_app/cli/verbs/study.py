@@ -8,7 +8,7 @@ With --synthetic a study of ten simulated subjects is made first, and its ground
 """
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from datetime import datetime
 from pathlib import Path
@@ -192,6 +192,7 @@ def _pool(options: argparse.Namespace, folder: Path, output: Path, console: Cons
     visit_options = VisitOptions(model, area_law(options) or FIXED, options.paths, options.calibration_error, along)
     # Errors in these files are reported before hours of work.
     exclusions, truth = exclusions_in(folder), _load_ground_truth(folder)
+    files = _files(output, visit_options)
     shelf = Shelf(output / "results", visit_options)
     results, failures = visits(
         sessions, visit_options, shelf, console, scheduler=options.scheduler, workers=options.workers
@@ -202,8 +203,9 @@ def _pool(options: argparse.Namespace, folder: Path, output: Path, console: Cons
         truth["relation"] = population_relations(truth["people"], visit_options.prediction, visit_options.area)
     study = pool_visits(results, failures, exclusions, truth, visit_options, BY_NAME[options.quantity])
     console.progress(0.97, "writing the page")
-    files = _write(study, folder.resolve().name, output)
-    console.result({**files, "study": study.to_dict() | {"visits": [visit.session for visit in study.visits]}})
+    _write(study, folder.resolve().name, files)
+    places = {content: str(path) for content, path in files.items()}
+    console.result({**places, "study": study.to_dict() | {"visits": [visit.session for visit in study.visits]}})
     _print(study, files, console)
     flawed = any(visit.losses or any(row.flaws for row in visit.rows) for visit in study.visits)
     return FLAWED if failures or flawed else DONE
@@ -220,24 +222,40 @@ def _load_ground_truth(folder: Path) -> dict[str, Any] | None:
         raise RecordingError(f"{path} is damaged; delete it to pool the study without its ground truth") from damaged
 
 
-def _write(study: StudyFindings, name: str, output: Path) -> dict[str, str]:
+def _files(output: Path, options: VisitOptions) -> dict[str, Path]:
+    """Return what is written, by what it is. Raises ReportError, and NotOurs where it would replace others'."""
     from sessions.report import pages  # drawing is slow to load
 
-    files = {
-        "page": ("study.html", pages.study_page(study, name)),
-        "table": (pages.TRIALS, pages.trials_csv(study)),
-        "columns": (pages.TRIAL_COLUMNS, pages.columns_csv(study)),
-        "numbers": ("study.json", json_text(study.to_dict())),
-        "rivals": ("rivals.csv", pages.rivals_csv(study)),
+    names = {
+        "page": "study.html",
+        "table": pages.TRIALS,
+        "columns": pages.TRIAL_COLUMNS,
+        "numbers": "study.json",
+        "rivals": "rivals.csv",
     }
-    if study.options.paths != "none":
-        files["paths"] = ("paths.csv", pages.paths_csv(study))
-    for file, text in files.values():
-        pages.swap_in(output / file, text)
-    return {key: str(output / file) for key, (file, _) in files.items()}
+    if options.paths != "none":
+        names["paths"] = "paths.csv"
+    files = {content: output / name for content, name in names.items()}
+    pages.check_place(*files.values())
+    return files
 
 
-def _print(study: StudyFindings, files: dict[str, str], console: Console) -> None:
+def _write(study: StudyFindings, name: str, files: Mapping[str, Path]) -> None:
+    from sessions.report import pages
+
+    texts = {
+        "page": pages.study_page(study, name),
+        "table": pages.trials_csv(study),
+        "columns": pages.columns_csv(study),
+        "numbers": json_text(study.to_dict()),
+        "rivals": pages.rivals_csv(study),
+        "paths": pages.paths_csv(study),
+    }
+    for content, path in files.items():
+        pages.swap_in(path, texts[content])
+
+
+def _print(study: StudyFindings, files: Mapping[str, Path], console: Console) -> None:
     from sessions.report.study_prose import distinctions, exclusion_sentences, remarks, summary
 
     console.say(

@@ -195,6 +195,9 @@ def svg(picture: Sheet, name: str, title: str) -> str:
     return _finish_svg(buffer.getvalue(), name, title, picture.hover)
 
 
+SVG_MARK = '<svg role="img" aria-label='  # how the first element of our pictures begins, and of few others
+
+
 def _finish_svg(text: str, name: str, title: str, hover: Mapping[str, str]) -> str:
     """Return the SVG with titles for hovering, fallback fonts, and ids that are unique on a page."""
     text = text[text.index("<svg") :]
@@ -206,7 +209,7 @@ def _finish_svg(text: str, name: str, title: str, hover: Mapping[str, str]) -> s
     text = re.sub(r'\bid="([^"]+)"', rf'id="{name}-\1"', text)
     text = re.sub(r"url\(#([^)]+)\)", rf"url(#{name}-\1)", text)
     text = re.sub(r'href="#([^"]+)"', rf'href="#{name}-\1"', text)
-    text = text.replace("<svg ", f'<svg role="img" aria-label="{escape(title)}" ', 1)
+    text = text.replace("<svg ", f'{SVG_MARK}"{escape(title)}" ', 1)
     declaration = '<?xml version="1.0" encoding="utf-8"?>\n'
     if _SIMULATED.get():
         declaration += "<!-- SIMULATED: this picture shows no measurement of a real device or person -->\n"
