@@ -1,1 +1,1 @@
-"""The analyst's place without Qt: what is known of a session folder, what is shown of it, and the work behind it."""
+"""The analyst's window without Qt: its state, its texts, and its background work on a session folder."""

@@ -19,9 +19,9 @@ PHASES = {
 
 
 def compare_reports(first: Report, second: Report) -> ComparisonRows:
-    """Return every stimulus of either session, experiments in their order, and both sessions' means in `MEAN_PANELS`.
+    """Return every stimulus of either session, by experiment in order, and both sessions' means in `MEAN_PANELS`.
 
-    mu is the one that the model got; None where a session has no number.
+    mu is the model's input; None if a session has no number.
     """
     tables = [_numbers(report) for report in (first, second)]
     names = [experiment.name for report in (first, second) for experiment in report.experiments]
@@ -47,7 +47,7 @@ def _numbers(report: Report) -> dict[tuple[str, int], dict[str, float]]:
 
 
 def finger_text(state: AnalystState) -> str:
-    """Return the text about the settled finger, or the reason why there is none."""
+    """Return the text about the finger in full slip, or the reason why there is none."""
     if (row := selected_row(state)) is None:
         return ""
     prediction = row.prediction
@@ -67,9 +67,9 @@ def finger_text(state: AnalystState) -> str:
 
 
 def other_finger(state: AnalystState) -> tuple[Frame | None, str]:
-    """Return the compared session's settled finger for the chosen stimulus, and the text about it.
+    """Return the compared session's finger in full slip for the chosen stimulus, and the text about it.
 
-    Of repetitions it is the one that came as early among its own; "" is said where no session is compared.
+    Repetitions are matched by their order. The text is "" if no session is compared.
     """
     comparison, row = state.comparison, selected_row(state)
     if comparison is None or state.report is None or row is None or row.prediction is None:
@@ -92,7 +92,7 @@ def _of_stimulus(report: Report, reference: PredictionFinding) -> list[Predictio
 
 
 def film_text(film: m.FingerHistory | None, index: int | None = None) -> str:
-    """Return the text about one state of a history; without a state, why the history ends before it settles."""
+    """Return the text about one state of a history; without a state, why the history ends before full slip."""
     if film is None:
         return ""
     if index is None:
@@ -110,12 +110,12 @@ def film_text(film: m.FingerHistory | None, index: int | None = None) -> str:
         "SED {sed:.3f} kPa at small strain{errors} · {contact}",
         at=index + 1, count=len(film.film.instants), time=now.time, phase=tr(PHASES[now.phase]), depth=now.depth,
         slid=abs(now.travel), sed=1000.0 * now.sed, contact=_contact_text(film.film.frames[index]),
-        errors=errors_text(None),  # a course is not solved again for each of its steps
+        errors=errors_text(None),  # no errors are computed for the steps of a history
     )  # fmt: skip
 
 
 def name_and_errors(report: Report) -> str:
-    """Return the name of a session, and the errors that hold for all of its SEDs."""
+    """Return the name of a session, and error bounds for all of its SEDs."""
     return " · ".join(filter(None, (report.session, greatest_errors(report))))
 
 

@@ -1,4 +1,4 @@
-"""One state of the model's finger: arrays, fields over it, its places in a picture, and values at a place or a line."""
+"""One state of the model's finger: its arrays and fields, its place in a picture, and values at points and lines."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,24 +13,24 @@ from solver.quantities import FIELDS
 
 Phase = Literal["pressing", "sticking", "slipping in part", "sliding"]
 
-_TOP = 0.97  # of the corners' values lies below the end of the colour scale
+_TOP = 0.97  # share of the corners' values below the end of the colour scale
 _STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 Box = tuple[float, float, float, float]  # left, right, below, above [mm]
 Range = tuple[float, float]
 FIELD_ERRORS = tr_noop(
     "Fields, at every place: no estimate of the mesh's or the model's error. The SED over the finger has both."
 )
-_UNITS = {"MPa": ("kPa", 1000.0)}  # as people read them, and the factor
+_UNITS = {"MPa": ("kPa", 1000.0)}  # the unit shown, and the factor
 Line = tuple[tuple[float, float], tuple[float, float]]  # its ends [mm]
 
 _TISSUES = tr_noop(("epidermis", "dermis", "fat", "bone"))  # by the number of their region in the mesh
 _POINTS = 201  # along a line: finer than any element it crosses
-OUTSIDE = -1e-9  # least share of a corner: what lies on a side is in both triangles, whatever round-off says [-]
+OUTSIDE = -1e-9  # least share of a corner: round-off must not exclude a point on a side [-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameMesh:
-    """What the nodes of a frame are put together to."""
+    """Connectivity of the nodes of a frame."""
 
     triangles: Indices  # (t, 3)
     elements: Indices  # (e, 8) along the sides of each element of the mesh
@@ -40,7 +40,7 @@ class FrameMesh:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """A finger in the world: the surface is y = 0, the finger above it, lengths true [mm]."""
+    """A finger to scale [mm]: the surface is y = 0, the finger above it."""
 
     mesh: FrameMesh
     nodes: Array  # (n, 2) deformed
@@ -48,12 +48,12 @@ class Frame:
     outlines: Mapping[str, Array]  # deformed borders of layers by name, each (m, 2)
     patch: Array  # (m, 2) outline of the ending
     contact: Skin
-    row: Array  # (r,) SED of the receptors at `solver.prediction.ROW` [MPa]; nan where there is none
+    row: Array  # (r,) SED of the receptors at `solver.prediction.ROW` [MPa]; nan if there is none
 
 
 @dataclass(frozen=True, slots=True)
 class Instant:
-    """Numbers of a state on the way."""
+    """Numbers of a state on the load path."""
 
     time: float  # [s]
     depth: float  # of the bone [mm]
@@ -64,7 +64,7 @@ class Instant:
 
     @property
     def phase(self) -> Phase:
-        """What the finger does.
+        """Return the phase of the finger's movement.
 
         >>> Instant(1.2, 2.0, 0.3, 0.008, sticking=3, slipping=9).phase
         'slipping in part'
@@ -78,11 +78,11 @@ class Instant:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Film:
-    """A finger from first touch to its last state; where there is no settled one, as far as it was found."""
+    """A finger from first contact to full slip, or to its last equilibrium if there is no full slip."""
 
     frames: tuple[Frame, ...]
     instants: tuple[Instant, ...]
-    lost: tuple[float, float] | None = None  # the most squeezed place of the last good state [mm], where none settled
+    lost: tuple[float, float] | None = None  # most compressed point of the last equilibrium [mm], without full slip
 
 
 def step_above(value: float) -> float:
@@ -98,7 +98,7 @@ def step_above(value: float) -> float:
 
 
 def visible(nodes: Array, triangles: Indices, box: Box) -> Indices:
-    """Return those of the triangles (t, 3) between nodes (n, 2) that reach into a box."""
+    """Return the triangles (t, 3) on nodes (n, 2) whose bounding boxes overlap a box."""
     left, right, below, above = box
     x, y = nodes[triangles, 0], nodes[triangles, 1]
     inside = (x.max(axis=1) >= left) & (x.min(axis=1) <= right) & (y.max(axis=1) >= below) & (y.min(axis=1) <= above)
@@ -106,7 +106,7 @@ def visible(nodes: Array, triangles: Indices, box: Box) -> Indices:
 
 
 def halve_triangles(nodes: Array, sed: Array, triangles: Indices) -> tuple[Array, Array, Indices]:
-    """Cut each triangle (t, 3) into four at the middles of its sides, where the SED is the mean of its ends.
+    """Divide each triangle (t, 3) into four at the midpoints of its sides, where the SED is the mean of the ends.
 
     >>> corners = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]])
     >>> _, sed, four = halve_triangles(corners, np.array([0.0, 2.0, 4.0]), np.array([[0, 1, 2]]))
@@ -123,7 +123,7 @@ def halve_triangles(nodes: Array, sed: Array, triangles: Indices) -> tuple[Array
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A place in the world, where on the screen it lies, and the scale. Pixels count downwards."""
+    """A point [mm], its position on the screen, and the scale. Pixels count downwards."""
 
     x: float  # [mm]
     y: float  # [mm]
@@ -133,28 +133,28 @@ class View:
 
     @staticmethod
     def fit(box: Box, left: float, top: float, width: float, height: float) -> "View":
-        """Return the view that shows all of `box` at the foot of a rectangle of the screen [pixel]."""
+        """Return the view that fits `box` at the bottom of a rectangle of the screen [pixel]."""
         x0, x1, y0, y1 = box
         per_mm = min(width / (x1 - x0), height / (y1 - y0))
         return View((x0 + x1) / 2.0, y0, left + width / 2.0, top + height, per_mm)
 
     def to_screen(self, points: Array) -> Array:
-        """Return where points (n, 2) [mm] lie on the screen (n, 2) [pixel]."""
+        """Return the screen positions (n, 2) [pixel] of points (n, 2) [mm]."""
         return np.array([self.screen_x, self.screen_y]) + (points - [self.x, self.y]) * [self.per_mm, -self.per_mm]
 
     def from_screen(self, screen_x: float, screen_y: float) -> tuple[float, float]:
-        """Return the place [mm] at a pixel."""
+        """Return the point [mm] at a pixel."""
         return self.x + (screen_x - self.screen_x) / self.per_mm, self.y - (screen_y - self.screen_y) / self.per_mm
 
     def visible(self, left: float, top: float, width: float, height: float) -> Box:
-        """Return what a rectangle of the screen shows."""
+        """Return the box [mm] that a rectangle of the screen shows."""
         (x0, y1), (x1, y0) = self.from_screen(left, top), self.from_screen(left + width, top + height)
         return x0, x1, y0, y1
 
 
 @dataclass(frozen=True, slots=True)
 class FieldChoice:
-    """A field as people read it."""
+    """A field in its displayed unit."""
 
     name: str  # among the values of a frame
     label: str
@@ -173,7 +173,7 @@ class FieldChoice:
 
     @property
     def axis(self) -> str:
-        """What an axis of it says."""
+        """Return its label on an axis."""
         return f"{tr(self.label)} [{self.unit}]"
 
 
@@ -184,7 +184,7 @@ FIELD_CHOICES = (
 
 
 def automatic_range(field: FieldChoice, frames: Iterable[Frame]) -> Range:
-    """Return where the colours of frames begin and end: few nodes lie beyond; zero is the middle of signed ones."""
+    """Return the colour range of frames, with few nodes beyond it and zero at the middle for a signed field."""
     tops = [0.0]
     for frame in frames:
         values = np.abs(field.values_of(frame))
@@ -208,7 +208,7 @@ def corners_at(frame: Frame, points: Array) -> tuple[Indices, Array]:
     point, near = np.nonzero(boxed.all(axis=2))
     a, b, c = np.moveaxis(corners[some[near]], 1, 0)
     position = points[point]
-    with np.errstate(invalid="ignore", divide="ignore"):  # a triangle without an area holds no place
+    with np.errstate(invalid="ignore", divide="ignore"):  # a triangle without area contains no point
         area = _cross(b - a, c - a)
         shares = np.column_stack([_cross(b - position, c - position) / area, _cross(c - position, a - position) / area])
     shares = np.column_stack([shares, 1.0 - shares.sum(axis=1)])
@@ -226,7 +226,7 @@ def value_at(frame: Frame, field: FieldChoice, points: Array) -> tuple[Array, In
 
 
 def probe_text(frame: Frame, field: FieldChoice, x: float, y: float) -> str:
-    """Return what is at a place [mm]: the field with its unit, where it is, and the tissue."""
+    """Return the text about a point [mm]: the field with its unit, the position, and the tissue."""
     position_text = f"x {x:.3f} mm, y {y:.3f} mm".replace("-", "−")
     (value,), (triangle,) = value_at(frame, field, np.array([[x, y]]))
     if triangle < 0:
@@ -235,7 +235,7 @@ def probe_text(frame: Frame, field: FieldChoice, x: float, y: float) -> str:
 
 
 def along_skin(frame: Frame, field: FieldChoice) -> tuple[Array, Array]:
-    """Return the place on the skin at rest (m,) [mm], 0 over the receptor, and the field on the skin there (m,)."""
+    """Return the undeformed skin coordinate (m,) [mm], 0 over the receptor, and the field on the skin there (m,)."""
     skin = frame.mesh.skin
     if skin is None:
         return np.empty(0), np.empty(0)
@@ -243,7 +243,7 @@ def along_skin(frame: Frame, field: FieldChoice) -> tuple[Array, Array]:
 
 
 def along_line(frame: Frame, field: FieldChoice, line: Line) -> tuple[Array, Array]:
-    """Return the distance from the first end (m,) [mm] and the field there (m,); nan where there is no tissue."""
+    """Return the distance from the first end (m,) [mm] and the field there (m,), nan outside of the tissue."""
     endpoints = np.array(line)
     fraction = np.linspace(0.0, 1.0, _POINTS)
     values, _ = value_at(frame, field, endpoints[0] + fraction[:, None] * (endpoints[1] - endpoints[0]))
@@ -253,7 +253,7 @@ def along_line(frame: Frame, field: FieldChoice, line: Line) -> tuple[Array, Arr
 def read_out(unit: str, across: Array, position: float, curves: Sequence[tuple[str, str, Array]]) -> str:
     """Return the sample of `across` (m,) nearest to `position`, and the name, value and unit of each curve (m,) there.
 
-    It is empty beyond the curves' ends. A value that is not known is a dash.
+    It is empty beyond the curves' ends. An unknown value is a dash.
 
     >>> curves = [("N", "N", np.array([0.0, 1.5, 3.0])), ("µ", "", np.full(3, np.nan))]
     >>> read_out("s", np.array([0.0, 0.1, 0.2]), 0.12, curves)

@@ -12,22 +12,22 @@ from daq_app.analyst import state as m
 from daq_app.child_process import Child
 from daq_app.wording import tr
 
-Connection = Any  # one end of a pipe; its type is another one on each system
-_PATIENCE = 0.15  # work that has not stopped by then is ended [s]
-URGENT = (m.Stop, m.Move, m.Undo)  # requests that interrupt the model's answers, which start again afterwards
+Connection = Any  # one end of a pipe; its type differs between systems
+_PATIENCE = 0.15  # for work to stop, before its process is ended [s]
+URGENT = (m.Stop, m.Move, m.Undo)  # requests that interrupt the model's answers, which resume afterwards
 
 
 def run(connection: Connection, folder: str) -> None:
-    """Analyse and predict the session in `folder`, and do what is asked for until the window is gone."""
+    """Analyse and predict the session in `folder`, and serve requests until the window is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # What is half written is taken back before the end.
+    # Partly written files are removed before the end.
     signal.signal(signal.SIGTERM, lambda _signal, _frame: sys.exit(0))
     with suppress(EOFError, OSError):
         _Server(connection).serve(Path(folder))
 
 
 class _Server:
-    """Does what is asked, one thing after the other, and the model's answers in between."""
+    """Carries out requests one by one, and computes the model's answers in between."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection, self._send = connection, connection.send
@@ -35,13 +35,13 @@ class _Server:
         self._halted = False  # somebody stopped the model's answers
 
     def serve(self, folder: Path) -> None:
-        """Work until the window is gone: then EOFError or OSError is raised."""
+        """Work until the window is gone. Raises EOFError or OSError then."""
         from daq_app.analyst.work import Work, sentence_of
         from solver import Cancelled
 
         try:
             work = Work(folder, self._send, self._urgent)
-        except Exception as error:  # noqa: BLE001  whatever it is, the window gets a message and stays
+        except Exception as error:  # noqa: BLE001  the window gets a message and stays open
             self._send(m.Problem(sentence_of(error)))
             return
         while True:
@@ -61,8 +61,8 @@ class _Server:
                     self._halted = self._halted and not isinstance(request, m.GoOn | m.Move | m.Undo)
                     work.do(request)
             except Cancelled:
-                pass  # what it was left for is the next that is asked
-            except Exception as error:  # noqa: BLE001  likewise
+                pass  # the interrupting request is the next one
+            except Exception as error:  # noqa: BLE001  the window gets a message and stays open
                 self._halted = self._halted or request is None
                 self._send(m.Problem(sentence_of(error)))
 
@@ -71,7 +71,7 @@ class _Server:
             self._requests.append(self._connection.recv())
 
     def _urgent(self) -> bool:
-        """Say whether something waits that does not bear to; it comes first then."""
+        """Say whether an urgent request is waiting; a stop discards all other requests."""
         self._take()
         stops = [request for request in self._requests if isinstance(request, m.Stop)]
         if stops:
@@ -81,15 +81,15 @@ class _Server:
 
 
 class Analyst:
-    """The work as the window sees it: nothing here waits."""
+    """The window's interface to the work. No method waits."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._stop_time: float | None = None  # when it was asked to stop and has not yet
+        self._stop_time: float | None = None  # of a stop that is not yet answered
         self._child: Child | None = self._begin()
 
     def poll(self) -> tuple[m.Reply, ...]:
-        """Return what came since the last call."""
+        """Return the messages since the last call."""
         messages: list[m.Reply] = []
         while self._child is not None:
             try:
@@ -109,18 +109,18 @@ class Analyst:
         return tuple(messages)
 
     def ask(self, request: m.Ask) -> None:
-        """Ask for something; where the work was ended before, it restarts and does that first."""
+        """Send a request; work that has ended restarts and begins with it."""
         if isinstance(request, m.Stop):
             self._stop_time = time.monotonic()
         if self._child is None:
             if isinstance(request, m.Stop):
                 return
             self._child = self._begin()
-        with suppress(OSError):  # `poll` finds that it is gone
+        with suppress(OSError):  # `poll` notices that it is gone
             self._child.send(request)
 
     def close(self) -> None:
-        """End the work."""
+        """End the work's process."""
         if self._child is not None:
             self._child.close()
         self._child = self._stop_time = None

@@ -1,4 +1,4 @@
-"""What the analyst's window says of a session: lines, numbers, tables, points, and the way back to the readings."""
+"""The analyst's texts about a session: lines, numbers, tables, points, and the path back to the readings."""
 
 import re
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from sessions.report.wording import shown_response
 
 Target = Literal["session", "trial", "prediction", "friction", "window", "readings"]
 _PLAIN = re.compile(r"[0-9]+(?:[.][0-9]+)?")
-RULES = tr_noop(("maximum", "mean over steady window"))  # `sessions` names which mu the model is given
+RULES = tr_noop(("maximum", "mean over steady window"))  # which mu the model is given, as named by `sessions`
 FRICTION_HEAD = tr_noop(
     ("trial", "stimulus", "µ steady", "95 %", "µ greatest", "τ max [kPa]", "V [mm/s]", "N [N]", "way", "flaws")
 )
@@ -25,13 +25,13 @@ _DIRECTIONS = {1: tr_noop("distal"), -1: tr_noop("proximal")}
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A stimulus in prediction against score."""
+    """A stimulus in the plot of prediction against score."""
 
     experiment: str
     index: int
     score: float
-    response: float  # the quantity that is held against the scores, in the unit shown
-    row: int  # that is chosen by it
+    response: float  # the quantity compared with the scores, in the unit shown
+    row: int  # selected by a click on it
 
 
 def row_text(row: Row) -> str:
@@ -39,7 +39,7 @@ def row_text(row: Row) -> str:
     answer = "" if row.answer is None else f"  {answer_text(row.answer.outcome, row.answer.answer)}"
     if row.stroke is None:
         finding = row.prediction or row.answer
-        assert finding is not None  # a row has at least one of them
+        assert finding is not None  # a row has at least one finding
         return _name_of(finding) + ("" if row.prediction is None else tr("  no stroke")) + answer
     mu = f"µ {quantity(row.stroke.mu_dynamic, 2)}"
     mark = ("  !" if row.stroke.flaws else "") + ("  ✎" if row.stroke.decided else "")
@@ -48,7 +48,7 @@ def row_text(row: Row) -> str:
 
 
 def marks_of(row: Row) -> str:
-    """Return what the marks of a line mean, for who hovers and for screen readers."""
+    """Return the meaning of a line's marks, for tool tips and screen readers."""
     stroke, failed = row.stroke, row.prediction is not None and row.prediction.sed is None
     flaws = tr("! has flaws: ") + _flaws(stroke) if stroke is not None and stroke.flaws else ""
     decision = tr("✎ somebody decided something about it") if stroke is not None and stroke.decided else ""
@@ -89,7 +89,7 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
 
 
 def _other_response(state: AnalystState, prediction: PredictionFinding) -> list[tuple[str, str]]:
-    """Return the chosen quantity with its errors; nothing where it is the SED, which always stands."""
+    """Return the chosen quantity with its errors; [] for the SED, which is always shown."""
     response_kind = shown_response(state.response)
     response = response_kind.numbers(prediction)
     if response_kind.name == SED.name or not response:
@@ -102,20 +102,20 @@ def _other_response(state: AnalystState, prediction: PredictionFinding) -> list[
 
 
 def sed_with_errors(report: Report | None, prediction: PredictionFinding) -> str:
-    """Return a SED with its error from the mesh, and the greatest from what the model leaves out, over all trials."""
-    assert prediction.sed is not None  # a trial without an answer has a reason in its place
+    """Return an SED with its error from the mesh, and the greatest omitted effect over all trials."""
+    assert prediction.sed is not None  # a trial without an SED shows a reason instead
     return f"{1000.0 * prediction.sed:.3f} kPa{errors_text(prediction.error_estimate, _effect(report))}"
 
 
 def sed_text(report: Report | None, prediction: PredictionFinding) -> str:
-    """Return a SED with its condition and errors."""
+    """Return an SED with its condition and errors."""
     return f"SED {condition(report, prediction)} {sed_with_errors(report, prediction)}"
 
 
 def greatest_errors(report: Report | None, response: str = SED.name) -> str:
-    """Return the condition and the errors that hold for every trial of a session; "" where none was predicted.
+    """Return the condition and error bounds for all trials of a session; "" if none was predicted.
 
-    The mesh's error is the greatest of all trials, and unknown where that of one is.
+    The mesh's error is the greatest of all trials, and unknown if that of one is unknown.
     """
     response_kind = shown_response(response)
     predictions = () if report is None else report.predictions
@@ -130,33 +130,33 @@ def greatest_errors(report: Report | None, response: str = SED.name) -> str:
 
 
 def picture_errors(report: Report | None, picture: str) -> str:
-    """Return the condition and the errors of what a picture of `session_pictures` shows; "" where it has no SED."""
+    """Return the condition and the errors for a picture of `session_pictures`; "" if it shows no SED."""
     return greatest_errors(report) if picture.partition(" ")[0] in ("relation", "response") else ""
 
 
 def _effect(report: Report | None) -> str:
-    """Return the greatest effect on the SED of what the model leaves out; "" where none is known."""
+    """Return the greatest omitted effect on the SED; "" if none is known."""
     facts = [fact for fact in (() if report is None else report.left_out) if fact.name != "warning"]
     most = max(facts, key=lambda fact: max(map(float, _PLAIN.findall(fact.value)), default=0.0), default=None)
     return "" if most is None else f"{most.name} {most.value}"
 
 
 def condition(report: Report | None, prediction: PredictionFinding) -> str:
-    """Return under which condition a SED holds: the depth that was prescribed, and the strain.
+    """Return the condition under which an SED holds: prescribed depth and kinematics.
 
-    The window shows another number while a session runs: that at the measured force.
+    While a session runs, the window shows the SED at the measured force instead.
     """
     depth = "" if prediction.indentation is None else tr("at {depth:.3g} mm", depth=prediction.indentation)
     return ", ".join(filter(None, (depth, "" if report is None else tr(report.model.split(",")[0]))))
 
 
 def friction_table(report: Report | None) -> tuple[tuple[str, ...], ...]:
-    """Return a line of `FRICTION_HEAD` for each stroke, in order of time; "–" where honesty allows no number."""
+    """Return a line of `FRICTION_HEAD` for each stroke, in order of time; "–" for a withheld number."""
     return () if report is None else tuple(_friction_line(stroke) for stroke in report.strokes)
 
 
 def scene_table(state: AnalystState) -> tuple[tuple[str, str, str], ...]:
-    """Return what the model holds of the chosen trial, and of all: name, value, remark."""
+    """Return the model's inputs for the chosen trial and for all: name, value, remark."""
     row = selected_row(state)
     prediction = None if row is None else row.prediction
     facts: list[tuple[str, str, str]] = []
@@ -175,7 +175,7 @@ def scene_table(state: AnalystState) -> tuple[tuple[str, str, str], ...]:
 
 
 def session_pictures(report: Report | None) -> tuple[tuple[str, str], ...]:
-    """Return names and words of the pictures of a whole session, whether or not there are numbers for them."""
+    """Return names and titles of all pictures of a session, including those without data."""
     if report is None:
         return ()
     experiments = [experiment.name for experiment in report.experiments] or [""]
@@ -186,7 +186,7 @@ def session_pictures(report: Report | None) -> tuple[tuple[str, str], ...]:
 
 
 def points(state: AnalystState) -> tuple[Point, ...]:
-    """Return prediction against score, a point for each stimulus that has both."""
+    """Return the points of prediction against score, one for each stimulus that has both."""
     report = state.report
     if report is None:
         return ()
@@ -205,7 +205,7 @@ def points(state: AnalystState) -> tuple[Point, ...]:
 
 
 def progress_text(step: Step | None) -> str:
-    """Return what is being done, and how long it will still take.
+    """Return the current activity, and the time left.
 
     >>> progress_text(Step(0.5, "predicting", 3.2))
     'predicting  50 %, about 4 s left'
@@ -231,7 +231,7 @@ def _flaws(stroke: StrokeFinding) -> str:
 
 
 def _value(finding: StrokeFinding | PredictionFinding, name: str, form: str, factor: float = 1.0) -> str:
-    """Return a number of a finding in a form, or why there is none."""
+    """Return a formatted number of a finding, or the reason why there is none."""
     value: float | None = getattr(finding, name)
     return form.format(factor * value) if value is not None else f"–  {finding.reasons.get(name, '')}".rstrip()
 
@@ -252,7 +252,7 @@ def _friction_line(stroke: StrokeFinding) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """One element of the way: what it says, where it leads, and more of it for who asks."""
+    """One element of the path: its text, its target, and further details."""
 
     text: str
     target: Target
@@ -260,7 +260,7 @@ class Link:
 
 
 def lineage(state: AnalystState) -> tuple[Link, ...]:
-    """Return the way from the chosen trial's SED, or its friction where it has none, to its readings."""
+    """Return the path from the chosen trial's SED, or its friction if it has none, to its readings."""
     row = selected_row(state)
     if row is None:
         return ()

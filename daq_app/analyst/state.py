@@ -1,4 +1,4 @@
-"""What the analyst's window asks of the work, what the work says, and what is known after each message."""
+"""Requests of the analyst's window, replies of its work, and the state after each message."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -17,20 +17,20 @@ from sessions.report.contents import AnswerFinding, PredictionFinding, Report, S
 Key = tuple[int | None, int | None]  # trial, and number of the stroke, of a predicted row
 
 
-# ---- what the work says
+# ---- replies of the work
 
 
 class Step(Struct, frozen=True):
-    """Work goes on."""
+    """Progress of the work."""
 
-    fraction: float  # of all of it, 0 to 1
+    fraction: float  # of the whole, 0 to 1
     activity: str
-    remaining_s: float | None = None  # about how long it will still take [s]; None: not known
-    load_steps: int = 0  # of which `fraction` are done; 0: it is not done in load steps
+    remaining_s: float | None = None  # estimated time left [s]; None: unknown
+    load_steps: int = 0  # of which `fraction` are done; 0: not in load steps
 
 
 class ReportReady(Struct, frozen=True):
-    """What is known of the session now: its strokes alone, or the model's answers too."""
+    """The present report on the session: its strokes alone, or the model's answers too."""
 
     stage: Literal["analysed", "predicted"]
     report: Report
@@ -41,11 +41,11 @@ class TrialAnswer(Struct, frozen=True, eq=False):
     """The model's answer to one trial."""
 
     finding: PredictionFinding
-    finger: Frame | None  # settled; None where there is no answer
+    finger: Frame | None  # in full slip; None if there is no answer
 
 
 class SessionPicture(Struct, frozen=True):
-    """A picture of the session; `png` is empty where there are no numbers for it."""
+    """A picture of the session; `png` is empty if there are no data for it."""
 
     name: str
     title: str
@@ -57,45 +57,45 @@ class FingerHistory(Struct, frozen=True, eq=False):
 
     key: Key
     film: Film
-    reason: str = ""  # why it ends before a settled state; "" where it has one
+    reason: str = ""  # why it ends before full slip; "" if it reaches it
 
 
 class Excerpt(Struct, frozen=True, eq=False):
-    """The readings around one stroke, as they were recorded."""
+    """The recorded readings around one stroke."""
 
     stroke: int  # its number
     readings: RawReadings
 
 
 class OtherSession(Struct, frozen=True, eq=False):
-    """Another session, analysed and predicted alike."""
+    """Another session, with the same analysis and prediction."""
 
     folder: str
     report: Report
-    fingers: Mapping[Key, Frame] = msgspec.field(default_factory=dict[Key, Frame])  # the settled ones
+    fingers: Mapping[Key, Frame] = msgspec.field(default_factory=dict[Key, Frame])  # in full slip
 
 
 class Done(Struct, frozen=True):
-    """A file is whole, or a decision is recorded, undone or redone, and every number follows."""
+    """A file is complete, or a decision is recorded, undone or redone and the numbers are up to date."""
 
     sentence: str
 
 
 class Problem(Struct, frozen=True):
-    """Something could not be done; what was known before stays."""
+    """A request failed; the earlier state stays."""
 
     sentence: str
 
 
 class Cancelled(Struct, frozen=True):
-    """Somebody stopped the work; what was done before stays."""
+    """Somebody stopped the work; its earlier results stay."""
 
 
 class Idle(Struct, frozen=True):
-    """All that was asked for is done."""
+    """All requests are done."""
 
 
-# ---- what the window asks
+# ---- requests of the window
 
 
 class Choose(Struct, frozen=True):
@@ -115,55 +115,55 @@ class Move(Struct, frozen=True):
 
 
 class Undo(Struct, frozen=True):
-    """The last decision is taken back, or with `redo` the last taking back."""
+    """Undo the last decision, or with `redo` the last undo."""
 
     author: str
     redo: bool = False
 
 
 class Respond(Struct, frozen=True):
-    """Another quantity at the ending is held against the scores."""
+    """Compare another quantity at the ending with the scores."""
 
     response: str  # one of `solver.quantities`
 
 
 class Draw(Struct, frozen=True):
-    """Asks for a picture of the session."""
+    """Draw a picture of the session."""
 
     name: str
 
 
 class ShowHistory(Struct, frozen=True):
-    """Asks for the way of one trial's finger."""
+    """Draw the load path of one trial's finger."""
 
     key: Key
 
 
 class ShowReadings(Struct, frozen=True):
-    """Asks for the readings around one stroke."""
+    """Send the readings around one stroke."""
 
     stroke: int  # its number
 
 
 class Compare(Struct, frozen=True):
-    """Asks for another session beside this one."""
+    """Compare another session with this one."""
 
     folder: str
 
 
 class Write(Struct, frozen=True):
-    """Asks for a file: "report", one of `sessions.exchange.FORMATS`, or "picture NAME" of what `pictures` names."""
+    """Write a file: "report", one of `sessions.exchange.FORMATS`, or "picture NAME" with a name of `pictures`."""
 
     document: str
     path: str
 
 
 class GoOn(Struct, frozen=True):
-    """What was stopped goes on."""
+    """Continue the stopped work."""
 
 
 class Stop(Struct, frozen=True):
-    """Whatever is being done is stopped."""
+    """Stop the current work."""
 
 
 Ask = Choose | Move | Undo | Draw | ShowHistory | ShowReadings | Compare | Write | GoOn | Stop
@@ -179,39 +179,39 @@ OPENING = Step(0.0, tr_noop("opening"))
 
 @dataclass(frozen=True, slots=True)
 class AnalystState:
-    """Everything the window knows."""
+    """The state of the analyst's window."""
 
     folder: Path
     stage: Stage = "opening"
     report: Report | None = None
     history: History = field(default_factory=History)
-    version: int = 0  # of the report; pictures drawn of an earlier one are out of date
-    fingers: Mapping[Key, Frame] = field(default_factory=dict[Key, Frame])  # settled ones
+    version: int = 0  # of the report; pictures of earlier versions are out of date
+    fingers: Mapping[Key, Frame] = field(default_factory=dict[Key, Frame])  # in full slip
     pictures: Mapping[str, SessionPicture] = field(default_factory=dict[str, SessionPicture])  # of this version
-    film: FingerHistory | None = None  # the last that was asked for
-    excerpt: Excerpt | None = None  # likewise
+    film: FingerHistory | None = None  # the last one requested
+    excerpt: Excerpt | None = None  # the last one requested
     comparison: OtherSession | None = None
-    step: Step | None = OPENING  # None: nothing is being done
+    step: Step | None = OPENING  # None: no work
     outcome: str = ""  # how the last work ended
     halted: bool = False  # somebody stopped the model's answers
-    row: int = 0  # that is chosen
-    response: str = SED.name  # the quantity at the ending that is held against the scores
+    row: int = 0  # the selected one
+    response: str = SED.name  # the quantity at the ending that is compared with the scores
 
     @property
     def visible_film(self) -> FingerHistory | None:
-        """Return the history that was asked for, where it is that of the chosen trial."""
+        """Return the last history if it belongs to the chosen trial, else None."""
         row = selected_row(self)
         return self.film if row is not None and self.film is not None and self.film.key == row.key else None
 
     def common_range(self, choice: FieldChoice) -> Range:
-        """Return where the colours of all trials of the session, and of one compared with it, begin and end."""
+        """Return the common colour range of all trials of the session and of a compared session."""
         compared_fingers = () if self.comparison is None else self.comparison.fingers.values()
         return automatic_range(choice, (*self.fingers.values(), *compared_fingers))
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A line of the list: a stroke, or a predicted trial without one, or an answer where no forces were recorded."""
+    """A line of the list: a stroke, a predicted trial without one, or an answer without recorded forces."""
 
     trial: int | None
     stroke: StrokeFinding | None
@@ -220,12 +220,12 @@ class Row:
 
     @property
     def key(self) -> Key:
-        """What the model's answers of it are found by."""
+        """Return the key of the model's answers to it."""
         return self.trial, None if self.stroke is None else self.stroke.number
 
 
 def fold(state: AnalystState, message: Message) -> AnalystState:
-    """Return the state after a message; what was known stays until it is known again."""
+    """Return the state after a message; earlier data stay until they are replaced."""
     match message:
         case ReportReady():
             return _on_report(state, message)
@@ -267,7 +267,7 @@ def _on_request(state: AnalystState, request: Ask) -> AnalystState:
     match request:
         case Choose(row):
             row = max(0, min(row, len(rows(state)) - 1))
-            return state if row == state.row else replace(state, row=row, outcome="")  # which was of the one before
+            return state if row == state.row else replace(state, row=row, outcome="")  # the outcome is of another row
         case Write(document, path):
             return replace(state, step=Step(0.0, tr("writing {what} to {path}", what=document, path=path)), outcome="")
         case GoOn():
@@ -281,9 +281,9 @@ def _on_request(state: AnalystState, request: Ask) -> AnalystState:
 
 
 def rows(state: AnalystState) -> tuple[Row, ...]:
-    """Return the list: every stroke in order of time, and a trial without one before the strokes of later trials.
+    """Return the list: strokes in order of time, and each trial without a stroke before those of later trials.
 
-    A session of scores alone has its answers in place of strokes.
+    A session with scores only has its answers in place of strokes.
     """
     report = state.report
     if report is None:
@@ -303,13 +303,13 @@ def rows(state: AnalystState) -> tuple[Row, ...]:
 
 
 def selected_row(state: AnalystState) -> Row | None:
-    """Return the selected row; None where there is none."""
+    """Return the selected row, or None."""
     table = rows(state)
     return table[state.row] if state.row < len(table) else None
 
 
 def _on_report(state: AnalystState, message: ReportReady) -> AnalystState:
-    """Take a report; answers to strokes that did not change since stay until they are given again."""
+    """Take a report; answers to unchanged strokes stay until they are replaced."""
     report, previous = message.report, state.report
     fingers = state.fingers
     if message.stage == "analysed" and previous is not None:
@@ -323,7 +323,7 @@ def _on_report(state: AnalystState, message: ReportReady) -> AnalystState:
 
 
 def _keep_row(previous: AnalystState, state: AnalystState) -> AnalystState:
-    """Return the state after with the row that was chosen before, wherever it stands now."""
+    """Return the new state with the previously selected row, at its new position."""
     row, keys = selected_row(previous), [row.key for row in rows(state)]
     if row is not None and row.key in keys:
         return replace(state, row=keys.index(row.key))
@@ -331,7 +331,7 @@ def _keep_row(previous: AnalystState, state: AnalystState) -> AnalystState:
 
 
 def _model_input(stroke: StrokeFinding) -> tuple[int, object]:
-    """Return the number of a stroke, and its trial and friction, which are what the model gets of it."""
+    """Return the number of a stroke, and its trial and friction, which are the model's inputs."""
     friction = (stroke.mu_dynamic, stroke.mu_max, stroke.tau_max, stroke.speed, stroke.direction, stroke.normal_force)
     return stroke.number, (stroke.trial, friction)
 

@@ -1,4 +1,4 @@
-"""A stroke: its readings as they were recorded, the edges of its windows, and the decisions that move them."""
+"""A stroke: its recorded readings, the edges of its windows, and the decisions that move them."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -16,29 +16,29 @@ from sessions.strokes.decisions import Decision, Decisions
 from sessions.strokes.forces import in_face_frame
 
 AROUND = 1.0  # before and after a stroke of a recording without trials [s]
-MOST_FOR_ZERO = 0.3  # of the readings before contact that give the zero of a replay [s]
+MOST_FOR_ZERO = 0.3  # longest stretch of readings before contact for a replay's zero [s]
 Edge = Literal["onset", "lift", "steady begin", "steady end"]
 EDGES: tuple[Edge, ...] = tr_noop(("onset", "steady begin", "steady end", "lift"))
 _PLACES = tr_noop(("{name}/{file}, table blocks{rows}", "{name}/{file}, data sets readings/…{rows}"))  # live, sealed
-EDGE_DISTANCE = 0.02  # least distance of two edges [s]
-EDGE_STEP, EDGE_LEAP = 0.005, 0.05  # by which a key moves an edge, and with Shift [s]
+EDGE_DISTANCE = 0.02  # least distance between two edges [s]
+EDGE_STEP, EDGE_LEAP = 0.005, 0.05  # step of an edge by a key, and with Shift [s]
 EDGE_DECISIONS: dict[Edge, str] = {"onset": "onset", "steady begin": "steady", "steady end": "steady", "lift": "lift"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RawReadings:
-    """n readings and where they lie."""
+    """n readings and their location in the file."""
 
     location: str  # file, data set and rows
     unit: str  # of the raw numbers
     block: ReadingBlock
-    normal: Array  # (n,) unfiltered, `zero` taken off [N]
-    tangential: Array  # (n,) likewise [N]
-    zero: str  # which zero was taken off, for people
+    normal: Array  # (n,) unfiltered, `zero` subtracted [N]
+    tangential: Array  # (n,) unfiltered, `zero` subtracted [N]
+    zero: str  # description of the subtracted zero
 
 
 class RawFile:
-    """The readings of a recording, with the rows they have in its file; what is needed again is kept."""
+    """The readings of a recording, with their rows in its file. Caches data for later calls."""
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
@@ -46,7 +46,7 @@ class RawFile:
         self._first_rows: dict[tuple[int, int], int] | None = None  # rows before the block that begins so
 
     def around(self, stroke: StrokeFinding) -> RawReadings:
-        """Return the readings of the take that holds a stroke, or of a recording without trials those around it."""
+        """Return the readings of a stroke's take; in a recording without trials, those around the stroke."""
         block = self._block(stroke)
         return _with_forces(self._recording, stroke, block, self._location(block))
 
@@ -60,7 +60,7 @@ class RawFile:
         return self._all_readings.between(*np.searchsorted(self._all_readings.time, [begin, end]).tolist())
 
     def _location(self, block: ReadingBlock) -> str:
-        """Return file and data set of readings, with the rows they have there."""
+        """Return file and data set of readings, with their rows there."""
         folder = self._recording.folder
         if not len(block):
             return tr("{name}: no readings", name=folder.name)
@@ -70,7 +70,7 @@ class RawFile:
         return tr(_PLACES[sealed], name=folder.name, file=SEALED_FILE if sealed else LIVE_FILE, rows=rows)
 
     def _row(self, sequence: int, received_ns: int) -> int | None:
-        """Return the row of a reading; None where its block is damaged or gone."""
+        """Return the row of a reading; None if its block is damaged or gone."""
         if self._first_rows is None:
             self._first_rows, count = {}, 0
             for block in self._recording.blocks():
@@ -84,8 +84,8 @@ class RawFile:
 
 
 def _with_forces(recording: Recording, stroke: StrokeFinding, block: ReadingBlock, location: str) -> RawReadings:
-    """Return readings with the forces that they are, the mean of what came before contact taken off."""
-    assert recording.info is not None  # there is a stroke, so there is a transducer
+    """Return readings with their forces, minus the mean before contact."""
+    assert recording.info is not None  # a stroke implies a transducer
     calibration, contact = recording.info.calibration, -np.inf if stroke.onset is None else stroke.onset
     rows_before = np.flatnonzero((block.time < contact) & (block.status == 0))
     free = rows_before[block.time[rows_before] > block.time[rows_before].max(initial=-np.inf) - MOST_FOR_ZERO]
@@ -97,7 +97,7 @@ def _with_forces(recording: Recording, stroke: StrokeFinding, block: ReadingBloc
 
 
 class History(Struct, frozen=True):
-    """What undo and redo would do next, in words; empty where there is nothing."""
+    """Descriptions of the next undo and redo; "" if there is none."""
 
     undo: str = ""
     redo: str = ""
@@ -105,16 +105,16 @@ class History(Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class EdgePosition:
-    """One edge of a stroke and where it lies."""
+    """One edge of a stroke and its time."""
 
     edge: Edge
     time: float  # [s, device time]
-    present: bool  # False where there is none yet and this is only where one could be
-    decision: str  # who decided it and why; "" where the analysis found it
+    present: bool  # False if this is only a possible position
+    decision: str  # who decided it and why; "" if it comes from the analysis
 
 
 def edges_of(stroke: StrokeFinding) -> tuple[EdgePosition, ...]:
-    """Return the edges in order of time; of a stroke without a steady window where one could lie."""
+    """Return the edges in order of time; without a steady window, with possible edges of one."""
     trace = stroke.trace
     if stroke.onset is None and trace is None:
         return ()
@@ -130,7 +130,7 @@ def edges_of(stroke: StrokeFinding) -> tuple[EdgePosition, ...]:
 
 
 def clamp_edge(stroke: StrokeFinding, edge: Edge, time: float) -> float:
-    """Return the instant nearest to `time` [s] at which an edge may lie: between its neighbours."""
+    """Return the allowed time nearest to `time` [s] for an edge: between its neighbours."""
     times = {position.edge: position.time for position in edges_of(stroke)}
     index = EDGES.index(edge)
     low = times[EDGES[index - 1]] + EDGE_DISTANCE if index > 0 else float("-inf")
@@ -148,27 +148,27 @@ def decision_of(stroke: StrokeFinding, edge: Edge, time: float, author: str, rea
 
 
 def reversal(decisions: Decisions, author: str, *, redo: bool) -> Decision | None:
-    """Return the line that undoes the last decision in force, or `redo` takes the last undoing back; None: nothing."""
+    """Return the line that undoes the last decision in force, or with `redo` the last undo; None if there is none."""
     lines = _undone(decisions) if redo else [line for line in decisions.standing if line.undoes is None]
     reason = "redone in the window" if redo else "undone in the window"
     return Decision(author, reason, undoes=lines[-1].number) if lines else None
 
 
 def history(decisions: Decisions) -> History:
-    """Return what undo and redo would do next."""
+    """Return the descriptions of the next undo and redo."""
     lines = (reversal(decisions, "", redo=redo) for redo in (False, True))
     effects = (None if line is None else effective_decision(decisions, line) for line in lines)
     return History(*("" if effect is None else f"{effect.what} of {effect.target_text}" for effect in effects))
 
 
 def _undone(decisions: Decisions) -> list[Decision]:
-    """Return the lines that undo a decision, and have come since the last one."""
+    """Return the lines that undo a decision and are newer than the last decision."""
     numbers = {line.number for line in decisions.lines if line.undoes is None}
     return [line for line in decisions.standing if line.undoes in numbers and line.number > max(numbers)]
 
 
 def effective_decision(decisions: Decisions, line: Decision) -> Decision:
-    """Return the decision that a line undoes or redoes, however often it was undone and redone before."""
+    """Return the decision that a line undoes or redoes, through any chain of undo and redo."""
     by_number = {decision.number: decision for decision in decisions.lines}
     while line.undoes is not None:
         line = by_number[line.undoes]

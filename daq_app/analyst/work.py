@@ -1,4 +1,4 @@
-"""What is made of a session for the analyst: first its strokes, then the model's answers, then what is asked for."""
+"""The work on a session for the analyst: first its strokes, then the model's answers, then requests."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -40,35 +40,35 @@ if TYPE_CHECKING:
 
 Send = Callable[[m.Reply], None]
 Progress = Callable[[float], bool]
-Urgent = Callable[[], bool]  # whether what is being done must be left for something else
-_MOST = 150  # states of a way that did not settle, which may be long
-AT_ONCE = 8  # states that are drawn between two reports of progress
+Urgent = Callable[[], bool]  # whether the current work must stop for another request
+_MOST = 150  # states shown of a load path without full slip, which may be long
+AT_ONCE = 8  # states drawn between two reports of progress
 
 
 class Work:
-    """A session, opened and analysed; the model's answers follow when `go_on` is called."""
+    """An open, analysed session; `go_on` computes the model's answers."""
 
     def __init__(self, folder: Path, send: Send, urgent: Urgent = lambda: False) -> None:
-        """Open and analyse it, and say what is found."""
+        """Open and analyse the session in `folder`, and send the results."""
         self._send, self._urgent = send, urgent
         send(m.Step(0.0, tr("opening")))
         self._recording = _open_recording(folder)
         self._raw = RawFile(self._recording)
         self._row = 0
-        self._load_paths: dict[m.Key, tuple[TrialPrediction, SolutionPath | None]] = {}  # no way at finite strain
+        self._load_paths: dict[m.Key, tuple[TrialPrediction, SolutionPath | None]] = {}  # no load path at finite strain
         self._sketches: dict[int, Sketch] = {}
         self._prediction: SessionPrediction | None = None
-        self._comparison: Report | None = None  # that is compared
+        self._comparison: Report | None = None  # of the compared session
         self._history: m.FingerHistory | None = None  # the last history
         self._analyse()
 
     @property
     def unfinished(self) -> bool:
-        """Say whether the model has not answered to all strokes as they are now."""
+        """Say whether answers to the present strokes are missing."""
         return self._prediction is None
 
     def go_on(self) -> None:
-        """Have the model answer, the chosen trial first. Raises Cancelled, and keeps what was answered."""
+        """Compute the model's answers, the chosen trial first. Raises Cancelled, and keeps the answers so far."""
         options, progress = _options(self._recording), self.progress_listener(tr("predicting"))
         plan, first = self._recording.plan, self._first()
         self._prediction = predict(self._analysis, plan, options, progress, self._take_answer, first)
@@ -76,7 +76,7 @@ class Work:
         self._send(m.ReportReady("predicted", self._report, history(read(self._recording.folder))))
 
     def do(self, request: m.Ask) -> None:
-        """Carry out a request and send the result. Raises Cancelled and whatever `sentence_of` knows."""
+        """Carry out a request and send the result. Raises Cancelled, and errors that `sentence_of` describes."""
         match request:
             case m.Choose(row):
                 self._row = row
@@ -96,7 +96,7 @@ class Work:
                 self._send(m.Done(tr("Written: {path}", path=self._write(request))))
 
     def progress_listener(self, activity: str, load_steps: int = 0) -> Callable[[float], bool]:
-        """Return a listener to progress that reports the part done and the time left, and stops for urgent requests."""
+        """Return a progress callback that reports fraction done and time left; it returns False for urgent requests."""
         start = last_report = time.monotonic()
 
         def report_part(fraction: float) -> bool:
@@ -167,8 +167,8 @@ class Work:
         self._send(m.SessionPicture(name, "" if panel is None else panel.title, png))
 
     def _panel(self, name: str, note: str = "") -> "tuple[Panel | None, bytes]":
-        """Return a picture, its `note` under it, and its PNG; `session_pictures` names those of the session."""
-        from sessions.report.figures import picture  # slow to load, and many never look at one
+        """Return a picture with a `note` below it, and its PNG; `session_pictures` names those of the session."""
+        from sessions.report.figures import picture  # slow to load, and often not needed
         from sessions.report.figures.finger import common_levels, finger_panels
         from sessions.report.figures.style import in_pixels, look
 
@@ -191,7 +191,7 @@ class Work:
         return panel, b"" if panel is None else pixels[panel.name]
 
     def _note(self, name: str) -> str:
-        """Return what a picture that is written says under it: the condition and the errors of its SEDs."""
+        """Return the note below a saved picture: the condition and the errors of its SEDs."""
         picture_kind, _, subject = name.partition(" ")
         if picture_kind in ("finger", "contact"):
             stroke, _, step = subject.partition(" ")
@@ -204,7 +204,7 @@ class Work:
         return picture_errors(self._report, name)
 
     def _field(self, subject: str, every: Mapping[int, Field]) -> Field | None:
-        """Return the finger of a stroke, settled, or at a step of the history that was drawn last."""
+        """Return the finger of a stroke, in full slip or at a step of the last drawn history."""
         stroke, _, step = subject.partition(" ")
         if not step:
             return every.get(int(stroke))
@@ -212,7 +212,7 @@ class Work:
         if film is None or film.key[1] != int(stroke):
             return None
         finding = self._report.strokes[int(stroke) - 1]
-        if finding.index is None:  # a picture for paper says which stimulus it is of
+        if finding.index is None:  # a picture for paper must name its stimulus
             return None
         frame = film.film.frames[int(step)]
         fields = Fields(frame.nodes, frame.mesh.triangles, frame.values, frame.outlines, frame.patch)
@@ -229,7 +229,7 @@ class Work:
             return comparison_panel(MEAN_PANELS, names, compare_reports(self._report, comparison))
 
     def _fields(self) -> dict[int, Field]:
-        """Return the finger of every trial that was answered, by the number of its stroke."""
+        """Return the finger of every answered trial, by the number of its stroke."""
         pairs = ((stroke, field_of(row.block or "", row)) for (_, stroke), (row, _) in self._load_paths.items())
         return {stroke: field for stroke, field in pairs if field is not None and stroke is not None}
 
@@ -270,14 +270,14 @@ class Work:
         self._send(m.OtherSession(str(folder), self._comparison, fingers))
 
     def _write(self, request: m.Write) -> str:
-        """Write the report, a picture or an export, and return where it is."""
+        """Write the report, a picture or an export, and return its path."""
         path = Path(request.path)
         if request.document.startswith("picture "):
             return self._write_picture(request.document.removeprefix("picture "), path)
         self._send(m.Step(0.0, tr("writing {what}", what=request.document)))
         if self._prediction is None:
             self.go_on()
-        assert self._prediction is not None  # it was just made
+        assert self._prediction is not None  # it has just been computed
         if request.document == "report":
             from sessions.report import pages
 
@@ -314,7 +314,7 @@ class Work:
 
 
 class NothingToShow(Exception):
-    """What was asked for is not there; one sentence says why."""
+    """There is nothing to show or save for a request; the message says why."""
 
 
 def _open_recording(folder: Path) -> Recording:
@@ -325,12 +325,12 @@ def _open_recording(folder: Path) -> Recording:
 
 
 def _options(recording: Recording) -> PredictionOptions:
-    """Return the options of the kept prediction, or the usual ones; what nobody looks at here is not solved for."""
+    """Return the options of the kept prediction, or the defaults, without the parts that this window does not show."""
     return replace(stored_options(recording), intervals=False, variants="none", variant_intervals=False)
 
 
 def sentence_of(error: Exception) -> str:
-    """Return a failure in a sentence."""
+    """Return a sentence that describes a failure."""
     if isinstance(error, OSError):
         return failure_sentence(error)
     return str(error) if is_ours(error) else f"{type(error).__name__}: {error}"
@@ -341,7 +341,7 @@ def _frame_mesh(sketch: Sketch) -> FrameMesh:
 
 
 def film_of(load_path: SolutionPath, instants: Sequence[Step], sketch: Sketch, progress: Progress) -> Film:
-    """Return the states of a way. Raises Cancelled where `progress` returns False."""
+    """Return the states of a load path. Raises Cancelled if `progress` returns False."""
     pictures: list[Still] = []
     for begin in range(0, len(instants), AT_ONCE):
         pictures += stills(load_path.finger, instants[begin : begin + AT_ONCE], sketch)
@@ -353,7 +353,7 @@ def film_of(load_path: SolutionPath, instants: Sequence[Step], sketch: Sketch, p
 
 
 def lost_film(load_path: SolutionPath, sketch: Sketch, progress: Progress) -> tuple[Film, str]:
-    """Return the states up to where a solve that has no answer came, and what stopped it there."""
+    """Return the states up to the failure of a solve without an answer, and the reason for it."""
     instants, failure = path_until_failure(load_path.scene, load_path.finger, progress)
     every = max(1, -(-len(instants) // _MOST))
     film = film_of(load_path, [*instants[:-1:every], instants[-1]], sketch, progress)

@@ -1,1 +1,1 @@
-"""Many sessions computed: workers, a cluster, derived numbers, sensitivity."""
+"""Batch computation: worker processes, a cluster, derived numbers, sensitivity."""

@@ -1,4 +1,4 @@
-"""Numbers made from a session: made, kept in its folder, and made once more to verify them."""
+"""Numbers derived from a session: computed, kept in its folder, and computed again to verify them."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -39,7 +39,7 @@ from sessions.toml_file import SettingsError, from_table
 
 ANALYSIS = "analysis.json"
 PREDICTION = "prediction.json"
-_VERBS = {ANALYSIS: "analyse", PREDICTION: "predict"}  # that make them
+_VERBS = {ANALYSIS: "analyse", PREDICTION: "predict"}  # verbs that compute them
 _SETTINGS = {  # what somebody may have set in them
     ANALYSIS: "law of the contact area and seed of the intervals",
     PREDICTION: "options and afferent of the prediction",
@@ -57,9 +57,9 @@ def analyse_session(
 ) -> Analysis:
     """Return the analysis of a session, with tau_max by a law of the area, and keep it in the session's folder.
 
-    `seed` is that of its intervals; `gain_error` is how uncertain each axis' gain is [-]. Where nobody
-    says, area and seed are as in the analysis that was kept before, and the gain's error as it was last set: what
-    somebody set is not lost by a verb that says nothing of it. Raises RecordingError where the last is damaged.
+    `seed` is that of its intervals; `gain_error` is the standard uncertainty of each axis's gain [-]. By default area
+    and seed are those of the stored analysis, and the gain's error is the one last set, so that a verb without these
+    options keeps earlier settings. Raises RecordingError if the gain's error is damaged.
     """
     previous = _read_or_empty(recording, ANALYSIS, console)
     if gain_error is None:
@@ -76,12 +76,12 @@ def analyse_session(
 
 
 def stored_settings(recording: Recording) -> AnalysisSettings:
-    """Return the settings that were asked for a session before. Raises RecordingError where the last is damaged."""
+    """Return the settings last chosen for a session. Raises RecordingError if the gain's error is damaged."""
     return replace(settings_of(_read_or_empty(recording, ANALYSIS)), gain_error=gain_error_set(recording.folder))
 
 
 def outdated_prediction(recording: Recording, now: AnalysisSettings) -> str | None:
-    """Say that the kept prediction has another law of the area, calibration error or seed; None where it has not."""
+    """Return a sentence if the kept prediction has another law of the area, calibration error or seed; else None."""
     previous = _read_or_empty(recording, PREDICTION)
     if not previous:
         return None
@@ -95,27 +95,27 @@ def outdated_prediction(recording: Recording, now: AnalysisSettings) -> str | No
 
 
 def stored_options(recording: Recording, variants: Literal["none", "small", "both"] = "none") -> PredictionOptions:
-    """Return the options of the prediction kept before, or the usual ones, with at least these `variants`."""
+    """Return the options of the kept prediction, or the defaults, with at least these `variants`."""
     previous = _read_or_empty(recording, PREDICTION)
     options = from_table(previous.get("options", {}), PredictionOptions, PREDICTION)
     return replace(options, variants=max(options.variants, variants, key=_RANK))
 
 
 def stored_afferent(recording: Recording) -> AfferentSettings | None:
-    """Return the parameters of the afferent kept with the prediction before; None where none was kept."""
+    """Return the afferent's parameters kept with the prediction; None if none were kept."""
     return _afferent_of(_read_or_empty(recording, PREDICTION))
 
 
 def _afferent_of(document: Mapping[str, Any]) -> AfferentSettings | None:
-    """Return the parameters of the afferent in a stored prediction; None where it has none. Raises SettingsError."""
+    """Return the afferent's parameters in a stored prediction; None if it has none. Raises SettingsError."""
     afferent: Mapping[str, Any] | None = document.get("afferent")
     return None if afferent is None else from_table(afferent.get("settings") or {}, AfferentSettings, PREDICTION)
 
 
 def stored_document(folder: Path, name: str) -> dict[str, Any] | None:
-    """Return the analysis or prediction kept in a session's folder; None where there is none.
+    """Return the analysis or prediction kept in a session's folder; None if there is none.
 
-    Raises RecordingError where it is damaged: what it holds, or which verb makes it anew.
+    Raises RecordingError if it is damaged; the message says what it holds, or which verb computes it again.
     """
     verb = _VERBS[name]
     try:
@@ -136,9 +136,9 @@ def stored_document(folder: Path, name: str) -> dict[str, Any] | None:
 
 
 def _read_or_empty(recording: Recording, name: str, console: Console | None = None) -> Mapping[str, Any]:
-    """Return a stored document; empty where there is none, or a damaged one.
+    """Return a stored document; empty if there is none, or a damaged one.
 
-    Who makes it anew gives a `console`, which names the loss of what somebody set in a damaged one.
+    Callers that compute it again pass a `console`, which reports settings lost in a damaged one.
     """
     try:
         return stored_document(recording.folder, name) or {}
@@ -155,10 +155,10 @@ def predict_session(
     options: PredictionOptions,
     afferent: AfferentSettings | None = None,
 ) -> SessionPrediction:
-    """Return what the model predicts for a session, and keep it in the session's folder.
+    """Return the model's prediction for a session, and keep it in the session's folder.
 
-    The firing of an `afferent` is kept with it; where nobody asks for one, with the parameters of the one kept before.
-    What else was kept before and is not asked for again is named. Raises as `predict` does.
+    The firing of an `afferent` is kept with it; by default with the parameters kept before. Other parts that were
+    kept before and are not computed again are named. Raises as `predict` does.
     """
     prediction = _predict(analysis, recording.plan, options, console.reporter("predicting"))
     previous = _read_or_empty(recording, PREDICTION, console)
@@ -175,7 +175,7 @@ def _with_firing(prediction: SessionPrediction, afferent: AfferentSettings | Non
 
 
 def _dropped_parts(previous: Mapping[str, Any], now: PredictionOptions) -> list[str]:
-    """Name what a stored prediction was asked for and another is not, with the words that ask for it."""
+    """Return the parts of a stored prediction that new options leave out, each with the option that requests it."""
     options = from_table(previous.get("options", {}), PredictionOptions, PREDICTION)
     lost = ["intervals of the SED (--intervals)"] if options.intervals and not now.intervals else []
     if previous and _RANK(options.variants) > _RANK(now.variants):
@@ -186,9 +186,9 @@ def _dropped_parts(previous: Mapping[str, Any], now: PredictionOptions) -> list[
 def repeat(
     name: str, document: Mapping[str, Any], recording: Recording, decisions: Decisions, plan_of: Recording | None = None
 ) -> dict[str, Any]:
-    """Make an analysis or a prediction once more, with the settings, options and blindness of its `document`.
+    """Compute an analysis or a prediction again, with the settings, options and blindness of its `document`.
 
-    The plan is that of `plan_of`, where `recording` is a replay of it. Raises SettingsError for a damaged document.
+    The plan is that of `plan_of` if `recording` is a replay of it. Raises SettingsError for a damaged document.
     """
     if name == ANALYSIS:
         bootstrap_table: Mapping[str, Any] = document.get("bootstrap") or {}
@@ -204,7 +204,7 @@ def repeat(
 
 
 def changes(name: str, document: Mapping[str, Any], fresh: Mapping[str, Any]) -> list[str]:
-    """Return a sentence for each number of a document that came out otherwise when repeated, and why that may be."""
+    """Return a sentence for each number of a document that changed when computed again, with possible reasons."""
     sentences = first_sentences(list(differences(document, json.loads(json.dumps(fresh)), name)))
     if not sentences:
         return []
@@ -215,7 +215,7 @@ def changes(name: str, document: Mapping[str, Any], fresh: Mapping[str, Any]) ->
 def _predict(
     analysis: Analysis, plan: SessionPlan, options: PredictionOptions, progress: Progress
 ) -> SessionPrediction:
-    """Return the prediction with all that its options ask for beside it."""
+    """Return the prediction with all parts that its options request."""
     stages = 1 + options.intervals + (options.variants != "none")
 
     def stage_progress(number: int) -> Progress | None:
@@ -228,7 +228,7 @@ def _predict(
 
 
 def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = None) -> dict[str, Any]:
-    """Return an analysis with its intervals, drawn again where `bootstrap` is another, as it is kept and printed."""
+    """Return an analysis in its stored form, with intervals, drawn again for another `bootstrap`."""
     settings, intervals = analysis.bootstrap, analysis.intervals
     if bootstrap is not None and bootstrap != settings:
         settings = bootstrap
@@ -237,9 +237,9 @@ def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = 
 
 
 def settings_of(document: Mapping[str, Any]) -> AnalysisSettings:
-    """Return the settings with which a stored analysis, or that under a stored prediction, is made once more.
+    """Return the settings to repeat a stored analysis, or the one under a stored prediction.
 
-    Only the area's law, the calibration's error and the intervals' seed can be asked for. Raises SettingsError.
+    Only the area's law, the calibration's error and the intervals' seed can be set. Raises SettingsError.
     """
     settings: Mapping[str, Any] = document.get("settings") or document
     area = from_table(settings.get("area") or {}, AreaLaw, "area")
@@ -256,7 +256,7 @@ def is_current(document: Mapping[str, Any], decisions: Decisions) -> bool:
 
 
 def decisions_of(document: Mapping[str, Any]) -> Decisions:
-    """Return the decisions that a stored document was made with. Raises SettingsError where they are damaged."""
+    """Return the decisions that a stored document was made with. Raises SettingsError if they are damaged."""
     try:
         return Decisions(as_type(document.get("decisions", []), tuple[Decision, ...]))
     except ValueError as error:
@@ -288,7 +288,7 @@ def open_visit(
 
 
 def _keep(console: Console, store: Callable[..., object], *facts: object) -> bool:
-    """Keep facts in a session's folder; name a folder that cannot be written, and return whether it could."""
+    """Store facts in a session's folder and return True; report a folder that cannot be written and return False."""
     try:
         store(*facts)
     except RecordingError as error:

@@ -1,4 +1,4 @@
-"""Many sessions computed at once, on cores of this computer or on a Dask cluster, each kept as soon as it is done."""
+"""Parallel computation of many sessions, on local cores or a Dask cluster, each kept as soon as it is done."""
 
 import asyncio
 import hashlib
@@ -29,36 +29,36 @@ from sessions.recording.schema import LIVE_FILE
 from sessions.statistics.visit import FORM, Visit, VisitOptions, visit_of
 from sessions.strokes.decisions import DECISIONS
 
-_LOOK = 0.1  # between two looks whether something is done [s]
-WITHOUT_WORKERS = 30.0  # that a cluster may have no worker before it is given up [s]
-_ANSWERS = 20.0  # that a scheduler may take to answer [s]
+_LOOK = 0.1  # between two polls for finished work [s]
+WITHOUT_WORKERS = 30.0  # longest time of a cluster without workers [s]
+_ANSWERS = 20.0  # longest time for a scheduler to answer [s]
 AGAIN = "run this again once it is there: what is done is kept"
-NUMBERS_BY = ("daq-app", "numpy", "scipy", "numba")  # whose other versions may give other numbers
-# All that a visit's numbers come from.
+NUMBERS_BY = ("daq-app", "numpy", "scipy", "numba")  # other versions of these may give other numbers
+# All files that a visit's numbers depend on.
 CONTENT = (LIVE_FILE, f"{LIVE_FILE}-wal", UNBLINDING, SEAL, DECISIONS, GAIN_ERROR)
 
 A = TypeVar("A")
-Jobs = Mapping[str, tuple[Any, ...]]  # arguments of each piece of work, by its name
-Answer = dict[str, Any] | str  # what a session brings, or why it brings nothing
+Jobs = Mapping[str, tuple[Any, ...]]  # arguments of each job, by its name
+Answer = dict[str, Any] | str  # a session's result, or why it has none
 
 
 class Lost(str):
-    """Why a job was not done."""
+    """The reason why a job was not done."""
 
 
 def content_of(session: Path) -> dict[str, bytes]:
-    """Return the files of a session that its numbers come from. Raises RecordingError."""
+    """Return the content of the files that a session's numbers depend on, by name. Raises RecordingError."""
     with name_failure(RecordingError, "its files cannot be read"):
         return {name: (session / name).read_bytes() for name in CONTENT if (session / name).is_file()}
 
 
 def compute_visit(folder: Path, options: VisitOptions) -> Answer:
-    """Return what the session in a folder brings; for a worker: nothing is raised."""
+    """Return the result of the session in a folder; never raises, since it runs in a worker."""
     try:
         return asdict(visit_of(Recording.open(folder), options, software_versions()))
     except Exception as error:  # noqa: BLE001  one bad session must not stop the rest
         sentence = " ".join(str(error).split()) or type(error).__name__
-        return sentence.replace(str(folder), folder.name)  # the same wherever it was computed
+        return sentence.replace(str(folder), folder.name)  # independent of where it was computed
 
 
 def _contents(folder: Path, options: VisitOptions) -> tuple[Any, ...]:
@@ -66,7 +66,7 @@ def _contents(folder: Path, options: VisitOptions) -> tuple[Any, ...]:
 
 
 def compute_sent_visit(name: str, content: Mapping[str, bytes], options: VisitOptions) -> Answer:
-    """Return what a session brings whose files were sent: a worker needs no disk in common with us."""
+    """Return the result of a session whose files were sent, so that a worker needs no shared disk."""
     with tempfile.TemporaryDirectory() as room:
         folder = Path(room) / name
         folder.mkdir()
@@ -81,12 +81,12 @@ class SchedulerError(Exception):
 
 @contextmanager
 def cluster_client(address: str) -> Generator[Any]:
-    """Give a client of the scheduler at an address. Raises SchedulerError where none answers, or it goes meanwhile."""
+    """Yield a client of the scheduler at an address. Raises SchedulerError if none answers, or if it goes."""
     try:
         library: Any = importlib.import_module("distributed")
     except ImportError as error:
         raise SchedulerError("a cluster needs the package distributed: pip install 'daq-app[cluster]'") from error
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # a sentence below says what it logs as errors
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # reported below as one sentence
     security: Any = library.Security()  # certificates as Dask's own configuration names them, for tls:// addresses
     server_type = asyncio.run(_identity(library, address, security))
     if server_type != "Scheduler":
@@ -107,22 +107,22 @@ def by_cluster(
     address: str,
     prepare: Callable[..., tuple[Any, ...]] = lambda *arguments: arguments,  # pyrefly: ignore[implicit-any-lambda]
 ) -> Generator[tuple[str, A | Lost]]:
-    """Yield each job's name and the result of `work`, as it comes from the workers of a cluster.
+    """Yield each job's name and the result of `work`, as they come from the workers of a cluster.
 
-    `prepare` turns a job's arguments into those that are sent, when its turn comes. What is under way when nobody takes
-    answers any more ends with the client. Raises SchedulerError.
+    `prepare` converts a job's arguments just before they are sent. Closing the generator cancels jobs under way.
+    Raises SchedulerError.
     """
     with cluster_client(address) as client:
         answers: Any = importlib.import_module("distributed").as_completed(loop=client.loop)
         queue = list(jobs)[::-1]
-        under_way: dict[Any, str] = {}  # by the key of the cluster
-        compatible = set[str]()  # workers whose versions are ours
-        last_worker_time = time.monotonic()  # when a worker was last there
+        under_way: dict[Any, str] = {}  # by the cluster's key
+        compatible = set[str]()  # workers with our versions
+        last_worker_time = time.monotonic()  # when there was last a worker
         while queue or under_way:
             crew: dict[str, int] = client.nthreads()
             threads = sum(crew.values())
             newcomers = [worker for worker in crew if worker not in compatible]
-            if newcomers:  # before it is given anything to compute, also where it comes later
+            if newcomers:  # before they compute anything, even if they join later
                 refuse_other_workers(client, newcomers, address)
                 compatible.update(newcomers)
             last_worker_time = time.monotonic() if threads else last_worker_time
@@ -131,7 +131,7 @@ def by_cluster(
                     f"{address}: the scheduler has had no worker for {WITHOUT_WORKERS:.0f} s; start some and run this "
                     "again: what is done is kept"
                 )
-            # Files are read and sent as workers come free: never those of a thousand sessions at once.
+            # Files are read and sent as workers become free, so that memory never holds those of all sessions.
             while queue and threads and len(under_way) < 2 * threads:
                 name = queue.pop()
                 try:
@@ -146,14 +146,14 @@ def by_cluster(
                 time.sleep(_LOOK)
                 continue
             future = next(answers)
-            if future.cancelled():  # nobody cancels but a client that has lost its scheduler
+            if future.cancelled():  # only a client that has lost its scheduler cancels
                 raise ConnectionError("the connection was lost")
             name, success = under_way.pop(future.key), future.status == "finished"
             yield name, future.result() if success else Lost(f"no worker could compute it ({future.exception()})")
 
 
 def refuse_other_workers(client: Any, workers: Sequence[str], address: str) -> None:  # noqa: ANN401
-    """Raise SchedulerError where a worker has other versions, or cannot compute; one that has gone says nothing."""
+    """Raise SchedulerError if a worker has other versions, or cannot compute; ignore one that has gone."""
     answers: dict[str, Any] = client.run(software_versions, workers=list(workers), on_error="return")
     for worker, versions in answers.items():
         if isinstance(versions, ImportError):
@@ -166,7 +166,7 @@ def refuse_other_workers(client: Any, workers: Sequence[str], address: str) -> N
 
 
 def refuse_unlike(versions: Mapping[str, Any], address: str, worker_name: str) -> None:
-    """Raise SchedulerError for what was computed by other versions: one study holds the numbers of one program."""
+    """Raise SchedulerError for results of other versions, so that one study holds the numbers of one program."""
     present = software_versions()
     differ = [name for name in NUMBERS_BY if versions.get(name) != present.get(name)]
     if differ:
@@ -178,32 +178,32 @@ def refuse_unlike(versions: Mapping[str, Any], address: str, worker_name: str) -
 
 
 async def _identity(library: Any, address: str, security: Any) -> str:  # noqa: ANN401 - distributed declares no types
-    """Return what answers at an address. Raises SchedulerError: a client alone waits for ever for what keeps silent."""
+    """Return the type of server at an address. Raises SchedulerError, where a client would wait forever for silence."""
     try:
         options = security.get_connection_args("client")
         async with asyncio.timeout(_ANSWERS), library.rpc(address, timeout=_ANSWERS, connection_args=options) as server:
             return str((await server.identity())["type"])
-    except Exception as error:  # any program may listen there and answer anything
+    except Exception as error:  # any program may listen there, with any answer
         reason = " ".join(str(error).split()) or f"nothing within {_ANSWERS:.0f} s"
         raise SchedulerError(
             f"{address}: no Dask scheduler answers there ({reason}); start one, or give no address"
         ) from error
 
 
-KILLED = 0.1  # that killed processes and their pool may take to end [s]
+KILLED = 0.1  # longest time for killed processes and their pool to end [s]
 
 
 class Shelf:
-    """Results by the content they were made of: the same recording, options and versions give the same key."""
+    """Results by content: the same recording, options and versions give the same key."""
 
     def __init__(self, folder: Path, options: VisitOptions) -> None:
-        """Keep results in `folder`, which is made when the first comes."""
+        """Keep results in `folder`, which is created with the first."""
         self._folder = folder
         recipe = {"form": FORM, "options": asdict(options), "versions": software_versions()}
         self._recipe = json.dumps(recipe, sort_keys=True, default=str).encode()
 
     def key(self, session: Path) -> str:
-        """Return the SHA-256 over all that a session's result comes from. Raises RecordingError."""
+        """Return the SHA-256 over everything that a session's result depends on. Raises RecordingError."""
         digest = hashlib.sha256(self._recipe)
         digest.update(session.name.encode())
         for name, content in content_of(session).items():
@@ -211,7 +211,7 @@ class Shelf:
         return digest.hexdigest()
 
     def load(self, key: str) -> Visit | None:
-        """Return the visit stored under a key; None where there is none, or where the file has changed."""
+        """Return the visit stored under a key; None if there is none, or if the file has changed."""
         with suppress(OSError, ValueError, KeyError, TypeError):
             entry = json_object(self.file(key).read_bytes())
             if entry["sha256"] == _digest(entry["visit"]):
@@ -219,11 +219,11 @@ class Shelf:
         return None
 
     def file(self, key: str) -> Path:
-        """Return where a result is kept."""
+        """Return the file of a result."""
         return self._folder / f"{key}.json"
 
     def keep(self, key: str, result: Mapping[str, Any]) -> None:
-        """Keep a result. Raises RecordingError where it cannot be written."""
+        """Store a result. Raises RecordingError if it cannot be written."""
         text = json.dumps({"sha256": _digest(result), "visit": result}, ensure_ascii=False, allow_nan=False)
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -248,9 +248,9 @@ def visits(
     scheduler: str | None = None,
     workers: int | None = None,
 ) -> tuple[list[Visit], list[tuple[str, str]]]:
-    """Return what each session brings, and the name of and the reason for each that brings nothing.
+    """Return the result of each session, and the name and reason for each without one.
 
-    What is on the shelf is not computed again. Raises SchedulerError, RecordingError for a shelf that takes nothing.
+    Results on the shelf are not computed again. Raises SchedulerError, and RecordingError if the shelf is not writable.
     """
     keys, failures = _keys(folders, shelf)
     console.note(*(f"{name}: {reason}" for name, reason in failures))
@@ -267,7 +267,7 @@ def visits(
     if remaining:
         console.progress(0.0, f"0 of {len(remaining)} sessions")
     jobs = {folder.name: (folder, options) for folder in remaining}
-    address = scheduler if remaining else None  # no scheduler is asked where all is computed
+    address = scheduler if remaining else None  # no scheduler is needed if everything is computed
     answers = (
         by_processes(compute_visit, jobs, workers)
         if address is None
@@ -296,7 +296,7 @@ def visits(
 
 
 def _keys(folders: Sequence[Path], shelf: Shelf) -> tuple[dict[Path, str], list[tuple[str, str]]]:
-    """Return the key of each session, and the name of and the reason for each that cannot be read."""
+    """Return the key of each session, and the name and reason for each that cannot be read."""
     keys: dict[Path, str] = {}
     failures: list[tuple[str, str]] = []
     for folder in folders:
@@ -314,7 +314,7 @@ def by_processes(work: Callable[..., A], jobs: Jobs, workers: int | None) -> Gen
         for name, answer in _in_pool(work, dict(remaining), workers) if remaining else ():
             del remaining[name]
             yield name, answer
-    except BrokenProcessPool:  # a worker died, and nobody knows over which job: each gets a worker of its own
+    except BrokenProcessPool:  # a worker died over an unknown job: each job gets its own worker
         for name, arguments in remaining.items():
             try:
                 yield from _in_pool(work, {name: arguments}, 1)
@@ -323,7 +323,7 @@ def by_processes(work: Callable[..., A], jobs: Jobs, workers: int | None) -> Gen
 
 
 def _in_pool(work: Callable[..., A], jobs: Jobs, workers: int | None) -> Generator[tuple[str, A]]:
-    """Yield names and answers. Where an exception leaves, as on Ctrl-C, the processes are killed."""
+    """Yield names and answers. On an exception, such as Ctrl-C, the processes are killed."""
     pool = process_pool(workers or min(os.cpu_count() or 1, max(len(jobs), 1)))
     try:
         futures = {pool.submit(work, *arguments): name for name, arguments in jobs.items()}
@@ -333,7 +333,7 @@ def _in_pool(work: Callable[..., A], jobs: Jobs, workers: int | None) -> Generat
         pool.shutdown()
     except BaseException:
         for process in multiprocessing.active_children():
-            process.kill()  # they hold nothing that is not computed again
+            process.kill()  # they hold only work that can be computed again
         thread = threading.Thread(target=pool.shutdown, kwargs={"cancel_futures": True}, daemon=True)
         thread.start()
         thread.join(KILLED)

@@ -1,4 +1,4 @@
-"""Which of a scene's numbers moves the SED: Sobol indices over a design (Saltelli 2010, by SALib)."""
+"""Sensitivity of the SED to a scene's numbers: Sobol indices over a design (Saltelli 2010, by SALib)."""
 
 import importlib
 import math
@@ -16,8 +16,8 @@ from solver.scene.tables import TISSUES, SceneError
 
 Design = Mapping[str, tuple[float, float]]  # dotted key of the scene file -> least and greatest value
 
-# Least and greatest value as parts of the scene's own. Skin is only thickened and the ending only raised, since it must
-# stay within the skin and the usual one ends at its inner side; bone is only thinned: some fat must be left below it.
+# Least and greatest value relative to the scene's own. Skin is only thickened and the ending only raised, because it
+# must stay within the skin and the usual one ends at its inner side. Bone is only thinned, to leave some fat below it.
 USUAL: Mapping[str, tuple[float, float]] = {
     "finger.tip_radius": (0.97, 1.1),
     "finger.epidermis": (1.0, 1.2),
@@ -31,31 +31,31 @@ USUAL: Mapping[str, tuple[float, float]] = {
     "friction.mu": (0.9, 1.1),
     "friction.tau_max": (0.7, 1.3),
 }
-_NARROW = 0.05  # half an interval of an index that is narrow enough to order by [-]
+_NARROW = 0.05  # half-width of an index's interval that is narrow enough for ordering [-]
 ANGLE, ANGLE_SPAN = "finger.contact_angle", 5.0  # [degrees]
-FATS_NU, NU_SPAN, NU_MOST = "materials.fat.nu", 0.0195, 0.4999  # the usual 0.48 may as well be nearly one half
+FATS_NU, NU_SPAN, NU_MOST = "materials.fat.nu", 0.0195, 0.4999  # the usual 0.48 could equally be nearly one half
 
 
 @dataclass(frozen=True, slots=True)
 class Index:
-    """How far one number moves the SED over its range in the design."""
+    """The influence of one number on the SED over its range in the design."""
 
     name: str
     low: float
     high: float
-    first: float  # share of the variance it makes alone
+    first: float  # share of the variance due to it alone
     first_error: float  # half of its 95 % bootstrap interval
-    total: float  # with all it does together with others
+    total: float  # including its interactions
     total_error: float
-    one_sided: bool  # the range does not reach to both sides of the scene's own value
+    one_sided: bool  # the range does not extend to both sides of the scene's own value
 
 
 class TooFewAnswers(Exception):
-    """Some scenes of the design have no answer: how many, and what to do."""
+    """Some scenes of the design have no answer; the message says how many, and what to do."""
 
 
 def usual_design(scene: Scene) -> dict[str, tuple[float, float]]:
-    """Return the design around a scene; what the scene leaves out is not varied."""
+    """Return the design around a scene; values that the scene leaves out are not varied."""
     values = {name: _value(scene, name) for name in USUAL}
     design = {name: (USUAL[name][0] * value, USUAL[name][1] * value) for name, value in values.items() if value}
     angle = scene.finger.contact_angle
@@ -110,8 +110,8 @@ def sensitivity(
 ) -> tuple[tuple[Index, ...], Array]:
     """Return the index of each number, greatest total first, and the SEDs (samples * (numbers + 2),) [MPa].
 
-    `samples` is a power of two. `sed` answers one scene; the solver does by default. Raises TooFewAnswers where a
-    scene of the design has no answer, SceneError where a range leaves what a scene may hold.
+    `samples` is a power of two. `sed` computes one scene, by default with the solver. Raises TooFewAnswers if a
+    scene of the design has no answer, SceneError if a range exceeds the limits of a scene.
     """
     points = saltelli_points(design, samples, seed)
     answer = sed or _sed_of
@@ -146,7 +146,7 @@ def sobol_indices(design: Design, answers: Array, seed: int, one_sided: Collecti
         _problem(design),
         answers,
         calc_second_order=False,
-        seed=seed + 1,  # SALib takes 0 for no seed at all
+        seed=seed + 1,  # SALib treats 0 as no seed
         num_resamples=200,
     )
     columns = zip(
@@ -161,7 +161,7 @@ def _problem(design: Design) -> dict[str, Any]:
 
 
 def doubts(indices: Sequence[Index], samples: int) -> tuple[str, ...]:
-    """Return what to doubt in the indices of a design of so many samples: one-sided ranges, impossible shares."""
+    """Return the doubts about indices from this number of samples: one-sided ranges, impossible shares."""
     sentences: list[str] = []
     one_sided = [index.name for index in indices if index.one_sided]
     if one_sided:
@@ -169,7 +169,7 @@ def doubts(indices: Sequence[Index], samples: int) -> tuple[str, ...]:
             f"Varied to one side of the scene's own value only: {', '.join(one_sided)}; their shares, and those of all "
             "others, are of these ranges."
         )
-    # No shares of a variance, so noise. A comparison with nan is false.
+    # Impossible as shares of a variance, so noise. A comparison with nan is false.
     wrong = [i.name for i in indices if i.first < 0.0 or i.total > 1.0 or i.first > i.total]
     if wrong:
         widest = max(max(index.first_error, index.total_error) for index in indices)
@@ -183,7 +183,7 @@ def doubts(indices: Sequence[Index], samples: int) -> tuple[str, ...]:
 
 
 def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
-    """Return the scene with the values at dotted keys. Raises SceneError where one is out of its range."""
+    """Return the scene with the values at dotted keys. Raises SceneError if one is out of its range."""
     branches: dict[str, dict[str, float]] = {}
     changes: dict[str, Any] = {}
     for name, value in values.items():
@@ -202,7 +202,7 @@ def _sed_of(scene: Scene) -> float:
 
 
 def _value(scene: Scene, name: str) -> float | None:
-    """Return the number at a dotted key, None where there is none."""
+    """Return the number at a dotted key, None if there is none."""
     value: Any = asdict(scene)
     try:
         for key in name.split("."):

@@ -1,7 +1,7 @@
-"""On which fingers a response keeps the sign of its slope: single changes, a map, and fingers drawn at random.
+"""Signs of a response's slope on many fingers: single changes, a map, and fingers drawn at random.
 
-A finger's answer is `sessions.prediction.surface_series`: how each quantity at the ending goes with the published
-surfaces. Fingers are computed side by side, and kept as they come where a file is given.
+A finger's answer is `sessions.prediction.surface_series`: how each quantity at the ending varies over the published
+surfaces. Fingers are computed in parallel, and stored one by one if a file is given.
 """
 
 import errno
@@ -26,8 +26,8 @@ from sessions.recording.head import software_versions
 from solver import Friction, Loading, Receptor, Scene, Solve
 
 Kinematics = Literal["small", "finite"]
-# What is drawn at random, and over which range. Nobody measured these: fingers of a lab's subjects would be better.
-# Thicknesses, bone and press go with the tip radius or the series, so that every draw is a finger that can be.
+# Numbers drawn at random, with their ranges. Nobody measured these: fingers of a lab's subjects would be better.
+# Thicknesses, bone and press scale with the tip radius or the series, so that every draw is a possible finger.
 DESIGN: Mapping[str, tuple[float, float]] = {
     "tip radius [mm]": (4.0, 8.0),
     "epidermis by tip radius": (0.10, 0.20),
@@ -49,14 +49,14 @@ _FORCE = 0.1  # of the change "pressed by one force" [N/mm]: 1.5 N on a finger 1
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One finger to be asked."""
+    """One finger to solve."""
 
     finger: Scene
     press: Press = field(default_factory=Press)
     arcs: tuple[float, ...] = (0.0,)
 
     def key(self, versions: Mapping[str, str]) -> str:
-        """Return what its answer is kept under: all that it comes from, and the `versions` that computed it."""
+        """Return the key of its answer: a hash of all inputs and of the `versions` that computed it."""
         return hashlib.sha256(json.dumps([asdict(self), versions], sort_keys=True, default=str).encode()).hexdigest()
 
 
@@ -70,7 +70,7 @@ def published_finger(kinematics: Kinematics = "small") -> Scene:
 
 
 def single_changes(kinematics: Kinematics) -> Mapping[str, Trial]:
-    """Return fingers that differ from the published one in one thing, by what that is."""
+    """Return fingers that differ from the published one in one respect, by the name of that change."""
     base = published_finger(kinematics)
     other_strain: Kinematics = "finite" if kinematics == "small" else "small"
 
@@ -95,7 +95,7 @@ def single_changes(kinematics: Kinematics) -> Mapping[str, Trial]:
 
 
 def map_trials(kinematics: Kinematics) -> Mapping[float, Trial]:
-    """Return the published finger with other tip radii [mm], asked at every place of the map."""
+    """Return the published finger with other tip radii [mm], each with every receptor position of the map."""
     base = published_finger(kinematics)
     fingers = {radius: replace(base, finger=replace(base.finger, tip_radius=radius)) for radius in RADII}
     return {radius: Trial(finger, arcs=PLACES) for radius, finger in fingers.items()}
@@ -140,7 +140,7 @@ def _scale_stiffness(scene: Scene, factors: Mapping[str, float]) -> Scene:
 
 
 def finger_answer(trial: Trial) -> Answer | str:
-    """Return what one finger answers, or why it cannot be asked."""
+    """Return the answer of one finger, or the reason why it has none."""
     by_quantity = series_slopes(trial.finger, trial.press, trial.arcs)
     if isinstance(by_quantity, str):
         return by_quantity
@@ -163,7 +163,7 @@ def answers_of(
 ) -> list[Answer | str]:
     """Return the answer of each finger, from processes of this computer or a Dask cluster.
 
-    What is done is written to `keep`, for the next run. Raises SchedulerError, OSError, TooFewAnswers.
+    Each answer is written to `keep`, for the next run. Raises SchedulerError, OSError, TooFewAnswers.
     """
     versions = software_versions()
     keys = [trial.key(versions) for trial in trials]
@@ -188,9 +188,9 @@ def answers_of(
 
 
 def _load_answers(keep: Path | None) -> dict[str, Any]:
-    """Return the answers that a file holds; a line that a crash cut short is left out. Raises OSError."""
+    """Return the answers in a file, without a line that a crash cut short. Raises OSError."""
     content = keep.read_bytes().strip() if keep is not None and keep.exists() else b""
-    if content and not content.startswith(b'{"key": "'):  # nothing is written behind it
+    if content and not content.startswith(b'{"key": "'):  # never append to another kind of file
         raise OSError(errno.EEXIST, "it holds something else than answers", str(keep))
     answers: dict[str, Any] = {}
     for line in content.splitlines():
@@ -201,19 +201,19 @@ def _load_answers(keep: Path | None) -> dict[str, Any]:
 
 
 def same_signs(answers: Sequence[Answer | str], as_published: Answer) -> Array:
-    """Return which quantities keep the published signs in both series (n, q): 1 or 0, nan without an answer."""
+    """Return for each quantity whether it keeps the published signs in both series (n, q): 1, 0, or nan (no answer)."""
     published = _signs(as_published)
     rows = [np.full(published.shape, np.nan) if isinstance(answer, str) else _signs(answer) for answer in answers]
     return np.array([np.where(np.isnan(row).any(axis=0), np.nan, (row == published).all(axis=0)) for row in rows])
 
 
 def _signs(answer: Answer) -> Array:
-    """Return the signs of the correlations with the index (series, q) at the first place; nan where there is none."""
+    """Return the signs of the correlations with the index (series, q) at the first position; nan if unknown."""
     return np.sign(np.array([answer[name][0][0] for name in SERIES], np.float64))
 
 
 def share(outcomes: Array) -> tuple[float, float, float] | None:
-    """Return the share of ones among numbers (n,), nan left out, with its 95 % interval; None of nothing.
+    """Return the share of ones among numbers (n,) without nan, with its 95 % interval; None if there are none.
 
     The interval is that of Wilson (1927, J. Am. Stat. Assoc. 22, 209).
 
@@ -245,7 +245,7 @@ def shares_by_thirds(outcomes: Array, values: Array) -> list[tuple[float, float,
 def slope_indices(
     answers: Sequence[Answer | str], series: str, quantity: int, seed: int
 ) -> tuple[tuple[Index, ...], int]:
-    """Return the Sobol indices of a quantity's change over a series, and of how many fingers: whole blocks alone."""
+    """Return the Sobol indices of a quantity's change over a series, and the number of fingers in complete blocks."""
     block = len(DESIGN) + 2
     changes = [None if isinstance(answer, str) else answer[series][1][0][quantity] for answer in answers]
     values = np.array(changes, np.float64).reshape(-1, block)  # nan for None

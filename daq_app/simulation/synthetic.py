@@ -1,11 +1,11 @@
-"""A whole study of simulated people, from plan to sealed folders, with its ground truth and faults.
+"""A complete study of simulated people, from plan to sealed folders, with its ground truth and faults.
 
 Ten subjects stroke and score the ten surfaces of the paper. Fingers differ in friction, transducers in calibration,
-people in how they use the scale; scores follow the maker's index and the friction that a subject's own finger feels,
-drift within a block and carry over from one trial to the next. Nobody here knows of a model of the finger.
+people in their use of the scale. Scores follow the maker's index and the friction of the subject's own finger,
+drift within a block and carry over from one trial to the next. No model of the finger is involved.
 
-The people of one study are ten of very many, and its intervals are for the others too, on the same ten surfaces. So
-very many more, each with a finger of its own, judge these surfaces in orders of their own (`relations`).
+The ten people of a study are a sample of a population, to which its intervals refer, on the same ten surfaces.
+`relations` computes the population values from many more people, each with their own finger and order.
 """
 
 import math
@@ -56,10 +56,10 @@ def conduct(
     run: RunnerSettings | None = None,
     durable: bool = True,
 ) -> SessionEnd:
-    """Run the session of these people into `folder` and seal it, however it ended, unless it can be resumed.
+    """Record the session of these people in `folder` and seal it after any ending, unless it can be resumed.
 
-    With `durable` False nothing waits for the disk. Raises RecordingError when the folder cannot be used or the disk
-    takes no more, and KeyboardInterrupt where the user stopped it, after it was sealed.
+    With `durable` False nothing waits for the disk. Raises RecordingError if the folder cannot be used or the disk
+    is full, and KeyboardInterrupt if the user stopped it, after sealing.
     """
     transducer = None if people.connected is None else people.connected.transducer
     info = None if transducer is None else transducer.info
@@ -81,9 +81,9 @@ def conduct(
 
 @contextmanager
 def recordings_in(folder: Path) -> Generator[None]:
-    """Guard work that records into `folder`. Raises RecordingError where that is not empty.
+    """Guard work that records into `folder`. Raises RecordingError if that is not empty.
 
-    Where the user stops the work after it recorded something, raises RecordingKept instead of KeyboardInterrupt.
+    If the user stops the work after it has recorded data, raises RecordingKept instead of KeyboardInterrupt.
     """
     if holds_something(folder):
         raise RecordingError(f"{folder} is not empty; give a new folder, for nothing is written over")
@@ -96,24 +96,24 @@ def recordings_in(folder: Path) -> Generator[None]:
 
 
 class StudyCutShort(Exception):
-    """A visit ended before its last trial; what was recorded until then is kept."""
+    """A visit ended before its last trial; its recording is kept."""
 
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """Where the visits lie, and the ground truth of the one with forces."""
+    """The folders of the visits, and the ground truth of the one with forces."""
 
-    scores: tuple[Path, ...]  # a folder a subject
+    scores: tuple[Path, ...]  # a folder per subject
     forces: Path
-    ground_truth: tuple[GroundTruth, ...]  # a row a trial
+    ground_truth: tuple[GroundTruth, ...]  # a row per trial
     readings: int
     lost: int
 
 
 def simulated_study(parent: Path, seed: int, clock: Clock, console: Console) -> Study:
-    """Run every visit into a folder of its own below `parent`. The same seed gives the same people and surfaces.
+    """Record every visit in its own folder below `parent`. The same seed gives the same people and surfaces.
 
-    Raises RecordingError where `parent` cannot be used, StudyCutShort where a visit did not come to its end.
+    Raises RecordingError if `parent` cannot be used, StudyCutShort if a visit ended early.
     """
     study_protocol = protocol(PROTOCOL)
 
@@ -153,9 +153,9 @@ PEOPLE = SubjectSettings(
     carry_over=0.04,
     moisture=0.08,
 )
-CALIBRATION = 0.01  # standard deviation of each axis' gain about 1 [-]
+CALIBRATION = 0.01  # standard deviation of each axis's gain about 1 [-]
 _LIGHT = 0.15  # peak normal force of a stroke that presses too lightly [N]
-_TICK = 0.1  # between two looks at the transducer [s of the session's clock]: five times as seldom as with people
+_TICK = 0.1  # between two polls of the transducer [s of the session's clock]: five times the interval used with people
 
 
 _DECISIONS = """# SIMULATED: decisions about a simulated study
@@ -176,9 +176,9 @@ FAULTS: Mapping[str, VisitFaults] = {
 
 
 def synthetic_study(parent: Path, seed: int, console: Console, subjects: int = SUBJECTS) -> None:
-    """Write the study below `parent`: a folder a visit, one that is damaged, decisions, and the ground truth.
+    """Write the study below `parent`: a folder per visit, a damaged one, decisions, and the ground truth.
 
-    The same seed gives the same readings and answers. Raises RecordingError where `parent` cannot be used.
+    The same seed gives the same readings and answers. Raises RecordingError if `parent` cannot be used.
     """
     strokes = [_visit(parent, seed, number, console) for number in range(1, subjects + 1)]
     (parent / DAMAGED).mkdir()
@@ -202,14 +202,14 @@ def synthetic_study(parent: Path, seed: int, console: Console, subjects: int = S
 
 
 def true_slopes(people: SubjectSettings) -> dict[str, Any]:
-    """Return the slopes of these people's scores on index, µ by descriptor, trials before and index before."""
+    """Return the slopes of these people's scores on index, µ by descriptor, trial position and previous index."""
     judgements = {name: SimulatedSubject(0, people).by_friction(name) for name in ("stickiness", "slipperiness")}
     by_index = people.gain * (1.0 - people.friction_weight)
     return {"gain": by_index, "friction": judgements, "drift": people.drift, "carry_over": people.carry_over}
 
 
 def _visit(parent: Path, seed: int, number: int, console: Console) -> list[dict[str, Any]]:
-    """Record one subject's visit and return its ground truth, a row a stroke."""
+    """Record one subject's visit and return its ground truth, a row per stroke."""
     subject, subject_seed = f"S{number:02d}", 100 * seed + number
     faults = FAULTS.get(subject, VisitFaults(expected=""))
     a, b, c, d, e, f = np.random.default_rng([subject_seed, 7]).normal(1.0, CALIBRATION, 6).tolist()
@@ -237,7 +237,7 @@ def _visit(parent: Path, seed: int, number: int, console: Console) -> list[dict[
 
 
 class SyntheticPeople(SimulatedPeople):
-    """Simulated people whose finger, calibration and visit are their own, and what goes wrong in it."""
+    """Simulated people with their own finger and calibration, and with the faults of their visit."""
 
     def __init__(
         self, subject: SimulatedSubject, clock: Clock, bench: Connection, session_plan: SessionPlan, faults: VisitFaults
@@ -246,7 +246,7 @@ class SyntheticPeople(SimulatedPeople):
         self._plan, self._faults = session_plan, faults
 
     def show(self, command: steps.Command) -> None:
-        """Do what the command asks for, but for what goes wrong."""
+        """Carry out the command, except for the faults of the visit."""
         match command:
             case steps.AskMount(trial) if trial.number == self._faults.aborted:
                 self.put(steps.Abort("the subject had to leave"))
@@ -256,18 +256,18 @@ class SyntheticPeople(SimulatedPeople):
                 super().show(command)
 
     def score(self, trial: Trial) -> float:
-        """Return the score of a trial, with drift within its block and what is carried over from the trial before."""
+        """Return the score of a trial, with drift within its block and carry-over from the previous trial."""
         _, position, previous_index = self._order(trial)
         return self.subject.score(self.surface(trial), 1, position, previous_index)
 
     def true_judgement(self, trial: Trial) -> dict[str, Any]:
-        """Return a trial's depth, its place, what was stroked before, and the score without noise."""
+        """Return a trial's depth, its position, the previous index, and the score without noise."""
         block, position, previous_index = self._order(trial)
         score = self.subject.expected_score(self.surface(trial), position, previous_index)
         return {"indentation": block.indentation, "place": position, "before": previous_index, "score": score}
 
     def _order(self, trial: Trial) -> tuple[Block, int, int | None]:
-        """Return a trial's block, its place in it from 0, and the index stroked before it."""
+        """Return a trial's block, its position there from 0, and the index stroked before it, None for the first."""
         block = next(block for block in self._plan.blocks if trial in block.trials)
         position = block.trials.index(trial)
         return block, position, block.trials[position - 1].stimulus.known_index if position else None
@@ -278,14 +278,14 @@ class SyntheticPeople(SimulatedPeople):
         return replace(surface, tau_max=surface.tau_max * light)
 
 
-# ---- how scores go with the model's SEDs among people at large: the truth of the study's headline
+# ---- relation of scores to the model's SEDs in the population: the truth of the study's headline
 
 Load = tuple[float, float, float, int, float]  # mu [-], tau_max [MPa], depth [mm], direction, speed [mm/s]
 SedsAt = Callable[[Sequence[Load]], Sequence[float | None]]
 
 SAMPLE_SIZE = 2000  # people
-_FIRST = 1_000_000  # seed: nobody of a study's
-_FINGERS = np.linspace(-4.0, 4.0, 9)  # solved: friction of the finger, in its standard deviations between people
+_FIRST = 1_000_000  # first seed, beyond those of a study's people
+_FINGERS = np.linspace(-4.0, 4.0, 9)  # friction of the solved fingers, in its standard deviations between people
 
 
 def population_relations(
@@ -293,8 +293,8 @@ def population_relations(
 ) -> dict[str, dict[str, float]]:
     """Return the relation for each descriptor with the SEDs of the published finger, which simulated people have.
 
-    None where a law of the area gives another tau_max than the true one, and none at finite strain, where most
-    sticky surfaces have no settled slide.
+    Empty with a law of the area, which gives another tau_max than the true one, and at finite strain, where most
+    sticky surfaces have no full slip.
     """
     if options.kinematics == "finite" or area != FIXED:
         return {}
@@ -302,9 +302,9 @@ def population_relations(
 
 
 def relations(people: SubjectSettings, seds: SedsAt) -> dict[str, dict[str, float]]:
-    """Return how single scores go with SEDs, for each descriptor; none where a surface has no settled slide.
+    """Return r and slope of single scores on SED for each descriptor whose surfaces all have full slip.
 
-    r is with the noise of judgement [-]; drift and carry-over are accounted for in the slope [points per kPa].
+    r includes the noise of judgement [-]; the slope [points per kPa] is adjusted for drift and carry-over.
     """
     by_descriptor: dict[str, dict[str, float]] = {}
     for block in plan(protocol(PROTOCOL), "S00", 0).blocks:
@@ -318,7 +318,7 @@ def relations(people: SubjectSettings, seds: SedsAt) -> dict[str, dict[str, floa
 def _seds_of_fingers(
     surfaces: Sequence[Surface], block: Block, moisture: float, seds: SedsAt
 ) -> Callable[[float], Sequence[float]] | None:
-    """Return what gives the SED [kPa] of each surface under a finger whose friction is so many times the usual."""
+    """Return a function from a finger's relative friction to the SED [kPa] of each surface; None without full slip."""
     times = np.exp(moisture * _FINGERS) if moisture else np.ones(1)
     loads = [
         (surface.mu * factor, surface.tau_max * factor, block.indentation, surface.direction, surface.speed)
@@ -338,7 +338,7 @@ def _seds_of_fingers(
 def _relation(
     people: SubjectSettings, surfaces: Sequence[Surface], seds: Callable[[float], Sequence[float]]
 ) -> dict[str, float]:
-    products = np.zeros((4, 4))  # of SED, place, index before, and score, each without the person's own mean
+    products = np.zeros((4, 4))  # of SED, position, previous index and score, each minus the person's mean
     draw, indices = np.random.default_rng(0), [surface.index for surface in surfaces]
     for seed in range(_FIRST, _FIRST + SAMPLE_SIZE):
         person = SimulatedSubject(seed, people)

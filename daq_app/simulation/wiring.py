@@ -1,4 +1,4 @@
-"""Builds real or simulated parts. Whoever runs a session reaches the simulators through here alone."""
+"""Connects real, simulated or replayed transducers and people: sessions reach the simulators only through here."""
 
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing, contextmanager
@@ -23,24 +23,24 @@ from simulators.stroke import Surface, paper_surfaces
 from simulators.subject import SimulatedSubject
 
 _SIMULATED = "sim"
-REPLAY = "replay:"  # and the path of a session folder
-JUDGING = 0.8  # from lift to score [s]; an unloaded stretch in which drift shows
+REPLAY = "replay:"  # followed by the path of a session folder
+JUDGING = 0.8  # from lift to score [s]; an unloaded stretch that reveals drift
 INPUT = "simulated"
 _OPTIONS = frozenset({"seed", "rate", "tool"})
 
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """An opened transducer, and the bench behind it where that is simulated in this process."""
+    """An open transducer, and its bench if that is simulated in this process."""
 
     transducer: Transducer
     bench: Bench | None = None
     bench_now: Callable[[], float] | None = None  # the bench's time [s]
-    recorded_frame: Frame | None = None  # of a recording that is replayed
+    recorded_frame: Frame | None = None  # of a replayed recording
 
     @property
     def frame(self) -> Frame | None:
-        """How the axes of a simulated or recorded bench lie to its face; None for a real one, which cannot tell."""
+        """Orientation of a simulated or recorded bench's axes to its face; None for a real bench (unknown)."""
         if self.bench is None:
             return self.recorded_frame
         return Frame("-z", "set", self.bench.settings.height, "set")
@@ -57,11 +57,11 @@ def load_timetable(path: Path) -> Timetable:
 
 @contextmanager
 def connect(uri: str, clock: Clock) -> Generator[Connection]:
-    """Open the transducer at `uri` and close it in any case.
+    """Yield the open transducer at `uri`, and close it afterwards.
 
-    `sim:?seed=7&rate=200` is the simulated bench: a box on loopback, read by the very driver a real box is read by.
-    `replay:recordings/P07` is the transducer of a recording, speaking as it spoke then. Raises SetupError or LinkLost
-    as the driver does, RecordingError for a folder that holds no recording.
+    `sim:?seed=7&rate=200` is the simulated bench: a box on loopback, read by the same driver as a real box.
+    `replay:recordings/P07` is the transducer of a recording, with the same output as then. Raises SetupError or
+    LinkLost as the driver does, RecordingError for a folder without a recording.
     """
     if uri.startswith(REPLAY):
         recording = Recording.open(Path(uri.removeprefix(REPLAY)))
@@ -74,7 +74,7 @@ def connect(uri: str, clock: Clock) -> Generator[Connection]:
             yield Connection(transducer)
         return
     check_form(address, "sim:?seed=7&rate=200", _OPTIONS)
-    without_tool(address)  # refused in terms of this address
+    without_tool(address)  # an error names this address
     bench = Bench(address.number("seed", 0, 0, 2**31 - 1))
     box = NetFtBox(bench, clock, rate=address.number("rate", 200, 1, 7000))
     box.start()
@@ -87,9 +87,9 @@ def connect(uri: str, clock: Clock) -> Generator[Connection]:
 def simulated_surface(trial: Trial, friction: Sequence[tuple[str, int, float]] = ()) -> Surface:
     """Return the simulated surface of a trial, stroked as the trial asks.
 
-    The simulated bench holds the ten surfaces of sensotact-friction. For any other stimulus the one with the nearest
-    index stands in, of the same descriptor where there is one, so that every protocol can be rehearsed. A protocol
-    may set `friction`, as descriptor, index and mu [-]: such a surface is pressed as hard as its stand-in.
+    The simulated bench holds the ten surfaces of sensotact-friction. Any other stimulus is replaced by the one with
+    the nearest index, of the same descriptor if possible, so that every protocol can be rehearsed. A protocol
+    may set `friction`, as descriptor, index and mu [-]: such a surface is pressed as hard as its substitute.
     """
     stimulus = trial.stimulus
     surfaces = paper_surfaces().values()
@@ -106,15 +106,15 @@ SurfaceOf = Callable[[Trial], Surface]
 
 
 class SimulatedHand:
-    """Mounts and strokes the simulated bench when a session asks for it, and does nothing else: people do the rest."""
+    """Mounts and strokes on the simulated bench when a session asks for it; people do the rest."""
 
     def __init__(
         self, subject: SimulatedSubject, bench: Connection | None, surface: SurfaceOf = simulated_surface
     ) -> None:
-        """Let the subject stroke the `surface` of each trial, unseen where there is no bench; it is a simulated one."""
+        """Let the subject stroke the `surface` of each trial; without a (simulated) bench no readings result."""
         self.subject, self.surface = subject, surface
         self.connected = bench
-        self.stroke_trials: list[Trial] = []  # in order, a trial once for each take
+        self.stroke_trials: list[Trial] = []  # in order, once per take
 
     @property
     def strokes(self) -> dict[int, StrokeGroundTruth]:
@@ -125,7 +125,7 @@ class SimulatedHand:
         return {trial.number: stroke for trial, stroke in zip(self.stroke_trials, ground_truth, strict=True)}
 
     def show(self, command: steps.Command) -> None:
-        """Do what the command asks a hand for."""
+        """Carry out the part of a command that concerns a hand."""
         bench = None if self.connected is None else self.connected.bench
         match command:
             case steps.AskMount(trial) if bench is not None:
@@ -137,16 +137,16 @@ class SimulatedHand:
                     bench.begin_stroke(stroke, self.connected.bench_now())
 
     def take(self, trial: Trial) -> int:
-        """Return how often a trial was stroked."""
+        """Return the number of strokes of a trial."""
         return sum(stroke_trial.number == trial.number for stroke_trial in self.stroke_trials)
 
     def poll(self) -> tuple[steps.Event, ...]:
-        """Return nothing: the transducer measures what a hand does."""
+        """Return no events: the transducer measures the hand."""
         return ()
 
 
 class SimulatedPeople(SimulatedHand):
-    """A simulated experimenter and subject, who answer every command of an unattended session at once.
+    """A simulated experimenter and subject, who answer every command of an unattended session immediately.
 
     With a bench the subject strokes it and judges after the lift. Without one there are no readings.
     """
@@ -158,25 +158,25 @@ class SimulatedPeople(SimulatedHand):
         bench: Connection | None = None,
         surface: SurfaceOf = simulated_surface,
     ) -> None:
-        """Let the subject answer on the session's clock; for the rest see `SimulatedHand`."""
+        """Let the subject answer on the session's clock; the other arguments are those of `SimulatedHand`."""
         super().__init__(subject, bench, surface)
         self.clock = clock
         self.judgement_s = JUDGING if bench else 0.0  # from lift to judgement [s]
         self._due: list[tuple[int, steps.Event]] = []  # session clock [ns]
 
     def put(self, event: steps.Event, delay: float = 0.0) -> None:
-        """Let an event come up in `delay` seconds of the clock."""
+        """Schedule an event in `delay` seconds of the clock."""
         self._due.append((self.clock.now_ns() + int(delay * 1e9), event))
 
     def poll(self) -> tuple[steps.Event, ...]:
-        """Return what has come up by now, once, in the order it was put in."""
+        """Return the events now due, once, in the order in which they were scheduled."""
         now_ns = self.clock.now_ns()
         events = tuple(event for due, event in self._due if due <= now_ns)
         self._due = [(due, event) for due, event in self._due if due > now_ns]
         return events
 
     def show(self, command: steps.Command) -> None:
-        """Do what the command asks for."""
+        """Carry out a command."""
         super().show(command)
         match command:
             case steps.AskBegin():
@@ -209,7 +209,7 @@ class SimulatedPeople(SimulatedHand):
                 return steps.PairedChoice("first" if self._more(first, second) else "second", time, 0, None, INPUT)
 
     def _more(self, first: Trial, second: Trial) -> bool:
-        """Say whether the first of two has more: of friction where one is a standard, else of its descriptor."""
+        """Say whether the first of two has more: friction if one is a standard, else of its descriptor."""
         if first.standard or second.standard:
             surfaces = self.surface(first), self.surface(second)
             return self.subject.more_friction(*surfaces, second.number, self.take(second))
