@@ -158,8 +158,8 @@ class NotOurs(Exception):
     """A file that would be written over is not ours: which one, what to do."""
 
 
-_MARKED = 3  # lines at the head of a file: in our pictures the mark is in the third
-_HEAD = 4096  # bytes that hold them
+_MARK_LINES = 3  # lines at the head of a file: in our pictures the mark is in the third
+_MARK_BYTES = 4096  # bytes that hold them
 
 
 def check_replaceable(path: Path, mark: str, *companions: Path) -> None:
@@ -170,8 +170,8 @@ def check_replaceable(path: Path, mark: str, *companions: Path) -> None:
     head = b""
     if path.is_file() or path.is_dir():
         with name_failure(NotOurs, f"{path} cannot be written over"), path.open("rb") as file:
-            head = file.read(_HEAD)
-    if any(line.startswith(mark.encode()) for line in head.splitlines()[:_MARKED]):
+            head = file.read(_MARK_BYTES)
+    if any(line.startswith(mark.encode()) for line in head.splitlines()[:_MARK_LINES]):
         return
     for file in (*([path] if head else []), *companions):
         if file.exists():
