@@ -28,7 +28,7 @@ from solver.body.linear import Elastic
 from solver.constitutive import Moduli
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import Finger, LinearFinger, settled_moduli
-from solver.equilibrium.load_path import end
+from solver.equilibrium.load_path import end_of_path
 from solver.failures import NotConverged
 from solver.mesh import ALONG, OUT, Lines, line
 from solver.mesh.mesher import FINEST, FingerMesh
@@ -209,8 +209,8 @@ def choose_steps(scene: Scene, finger: Finger[Patches], settled: EquilibriumStat
     """
     if settled is not None and not settled.load.path_dependent:
         return None
-    ends = [end(scene, finger, 1.0) if settled is None or scene.viscoelastic else settled]
-    usual, *fewer = finger.all_numbers(ends + [end(scene, finger, part) for part in PARTS.tolist()])
+    ends = [end_of_path(scene, finger, 1.0) if settled is None or scene.viscoelastic else settled]
+    usual, *fewer = finger.all_numbers(ends + [end_of_path(scene, finger, part) for part in PARTS.tolist()])
     return Steps.of(usual, np.array(fewer), scene.solve.target)
 
 

@@ -23,7 +23,7 @@ from solver.continuation.existence import (
 from solver.continuation.limit_point import ContinuationLimit, depth_limit
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, Newton, Termination, load_stepping
 from solver.equilibrium.finger import FiniteFinger
-from solver.equilibrium.load_path import march, slide_or_hold
+from solver.equilibrium.load_path import march_scene, slide_or_hold
 from solver.equilibrium.load_stepping import sliding_load, solve_under_forces
 from solver.failures import NoSteadyState, NotConverged
 from solver.progress import report_progress
@@ -59,7 +59,7 @@ def settled_state(
     Raises NoSteadyState, NotConverged, Cancelled.
     """
     if scene.loading.direction == 0 and scene.friction.mu > 0.0:
-        return march(scene, finger, step_factor).last
+        return march_scene(scene, finger, step_factor).last
     if scene.normal_force is not None:
         return _state_under_force(finger, scene, scene.normal_force, start, step_factor)
     return slide_on_branch(finger, sliding_load(scene), start=start)
@@ -103,7 +103,7 @@ def _state_under_force(
     """Return the settled state under given forces, with unknown depth and travel. Raises as `settled_state`."""
 
     def hold() -> EquilibriumState:
-        return march(scene, finger, step_factor).last
+        return march_scene(scene, finger, step_factor).last
 
     if start is not None and start.load.sense == 0:  # the end of a load path, no start for a slide
         start = None

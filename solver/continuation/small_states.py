@@ -16,7 +16,7 @@ from solver.arrays import Array
 from solver.contact import LoadState
 from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.finger import LinearFinger, cached_finger
-from solver.equilibrium.load_path import march, slide_or_hold
+from solver.equilibrium.load_path import march_scene, slide_or_hold
 from solver.equilibrium.load_stepping import forces_of, slide_from_guess, slide_under, sliding_load
 from solver.equilibrium.load_stepping import solve_full_slip as full_slip
 from solver.failures import ContactLost, NoSteadyState, NotConverged
@@ -178,12 +178,12 @@ def settled_state(scene: Scene, finger: LinearFinger, step_factor: float = 1.0) 
     """
     load, loading, newton = sliding_load(scene), scene.loading_per_mm, finger.newton
     if loading.direction == 0 and not load.frictionless:
-        return march(scene, finger, step_factor).last
+        return march_scene(scene, finger, step_factor).last
     if loading.normal_force is None:
         return full_slip(newton, load)
     force, deepest = loading.normal_force, MAX_DEPTH_SHARE * scene.finger.pulp_thickness()
     return slide_or_hold(
-        scene, lambda: slide_under(newton, load, force, deepest), lambda: march(scene, finger, step_factor).last
+        scene, lambda: slide_under(newton, load, force, deepest), lambda: march_scene(scene, finger, step_factor).last
     )
 
 

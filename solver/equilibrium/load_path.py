@@ -174,7 +174,7 @@ class LoadPath:
         return state
 
 
-def march(
+def march_scene(
     scene: Scene,
     finger: Finger[Patches],
     step_factor: float = 1.0,
@@ -196,9 +196,9 @@ def march(
     return path
 
 
-def end(scene: Scene, finger: Finger[Patches], step_factor: float = 1.0) -> EquilibriumState:
-    """Return the end of the load path of a scene in `step_factor` times the usual steps. Raises as `march`."""
-    return march(scene, finger, step_factor, relaxing=scene.viscoelastic).last
+def end_of_path(scene: Scene, finger: Finger[Patches], step_factor: float = 1.0) -> EquilibriumState:
+    """Return the end of the load path of a scene in `step_factor` times the usual steps. Raises as `march_scene`."""
+    return march_scene(scene, finger, step_factor, relaxing=scene.viscoelastic).last
 
 
 def slide_or_hold(
@@ -255,7 +255,7 @@ def _relaxing_body(mesh: Mesh, materials: Materials, _thread: int) -> RelaxingBo
 def apply_loading(
     path: LoadPath, finger: Finger[Patches], loading: Loading, steps: LoadSteps, step_factor: float, report: Report
 ) -> None:
-    """Append the press, and the slides or the drag. Raises as `march`."""
+    """Append the press, and the slides or the drag. Raises as `march_scene`."""
     press = loading.depth if loading.normal_force is None else loading.normal_force
     share = 1.0 if loading.dragged else 0.5  # of the work, for progress
     count = steps.press_steps * (2 if loading.dragged else 1)

@@ -16,7 +16,7 @@ from solver.continuation.limit_point import is_folded, is_sound
 from solver.continuation.small_states import check_depth
 from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.finger import FiniteFinger
-from solver.equilibrium.load_path import end, march
+from solver.equilibrium.load_path import end_of_path, march_scene
 from solver.equilibrium.load_stepping import forces_of, sliding_load
 from solver.equilibrium.relaxation import CondensedRelaxing
 from solver.failures import WRINKLES, Folds, NoSteadyState, NotConverged, SolveFailure
@@ -159,8 +159,8 @@ def _on_coarse(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None
     try:
         slide = rough_state(finger, scene.without_drag(), near)
     except SolveFailure:
-        return march(scene, finger).last  # the drag may be met before sliding would fold the skin
-    return slide if drag >= NEAR_SLIDE * abs(slide.force[0]) else march(scene, finger).last
+        return march_scene(scene, finger).last  # the drag may be met before sliding would fold the skin
+    return slide if drag >= NEAR_SLIDE * abs(slide.force[0]) else march_scene(scene, finger).last
 
 
 def refine(scene: Scene, fineness: float | Lines, coarse: MeshSolution, meshes: Meshes) -> NestedSolution:
@@ -211,7 +211,7 @@ def solve_nested(
             if steps is None:  # since it slid on the coarse mesh
                 choice = choose_steps(scene, top.finger, top.state)
                 steps = None if choice is None else replace(choice, factor=1)
-            state = end(scene, finger)
+            state = end_of_path(scene, finger)
         else:
             steps = None
             state = slide_near(finger, scene, start.state) or settled_state(finger, scene, start.state)
@@ -271,7 +271,7 @@ def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float)
         step_factor = steps_of_press(scene, nested.coarse.finger) if steps is None else steps.factor
         for slide in scene.earlier_slides():  # one that never settles is refused with its limits
             settled_state(finger, slide)
-        path = march(scene, finger, step_factor, relaxing=scene.materials.relax)
+        path = march_scene(scene, finger, step_factor, relaxing=scene.materials.relax)
         state = path.last
     if not state.touching.any():
         raise NotConverged(f"No contact was found at {state.load.depth:g} mm of indentation: ask for more depth.")

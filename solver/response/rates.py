@@ -17,7 +17,7 @@ from solver.arrays import Array
 from solver.contact import ForceLoad
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import KINDS, Finger
-from solver.equilibrium.load_path import PRESSING_TIME, LoadPath, march
+from solver.equilibrium.load_path import PRESSING_TIME, LoadPath, march_scene
 from solver.failures import SolveFailure
 from solver.prediction import History, Prediction
 from solver.quantities import NAMES
@@ -102,7 +102,7 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
     mesh, nested = kind.on(scene, geometry), kind.of(scene, replace(geometry.sizing, halved=True))
 
     def march_on(finger: Finger[Any], part: float) -> LoadPath:
-        return march(scene, finger, part, relaxing=scene.materials.relax)
+        return march_scene(scene, finger, part, relaxing=scene.materials.relax)
 
     try:
         fewer = [course_numbers(history(scene, mesh, march_on(mesh, part))) for part in PARTS.tolist()]

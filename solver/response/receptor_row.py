@@ -20,7 +20,7 @@ from solver.continuation.limit_point import is_sound
 from solver.continuation.small_states import WIDE_MARGIN, expected_depth, nearest_state, state_on_branch
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger, finite_laws, settled_moduli
-from solver.equilibrium.load_path import end
+from solver.equilibrium.load_path import end_of_path
 from solver.equilibrium.load_stepping import forces_of
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
@@ -74,11 +74,11 @@ def _row_errors(prediction: Prediction, values: Array, arcs: Array, receptor: Re
     nested, state, coarse = _solve_nested(prediction, sizing)
     in_steps = state.load.path_dependent
     if in_steps:
-        state = end(scene, nested)
+        state = end_of_path(scene, nested)
     (finer,), (edges,) = edge_changes(nested.newton, [(state, forces_of(scene, state.load))], row_numbers(nested))
     errors = half_width(finer - values.ravel(), edges, order_of(nested, state))
     if in_steps:
-        usual, *fewer = row_numbers(coarse)([end(scene, coarse, times) for times in (1.0, *PARTS.tolist())])
+        usual, *fewer = row_numbers(coarse)([end_of_path(scene, coarse, times) for times in (1.0, *PARTS.tolist())])
         errors += Steps.of(usual, np.array(fewer), scene.solve.target).bound
     return errors.reshape(values.shape)
 

@@ -25,7 +25,7 @@ from solver.continuation.small_states import (
 )
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import LinearFinger
-from solver.equilibrium.load_path import end, march
+from solver.equilibrium.load_path import end_of_path, march_scene
 from solver.equilibrium.load_stepping import forces_of
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh import Lines
@@ -137,7 +137,7 @@ class SmallMeshing(Meshing):
             def report(_: str, part: float) -> None:
                 report_part(progress, (position + part) / count)
 
-            path = march(scene, finger, step_factor, relaxing=relaxing, report=report)
+            path = march_scene(scene, finger, step_factor, relaxing=relaxing, report=report)
             state = path.last
             if relaxing:
                 state = replace(state, u=finger.body.condensed.displacement_under(state.reaction))
@@ -201,7 +201,7 @@ def nested_numbers_of_all(
     for number, solution in enumerate(solutions):
         try:
             states[number] = (
-                nearest_state(solution.scene, mesh) if solution.steps is None else end(solution.scene, mesh)
+                nearest_state(solution.scene, mesh) if solution.steps is None else end_of_path(solution.scene, mesh)
             )
         except SolveFailure:
             continue

@@ -9,7 +9,7 @@ import numpy as np
 from solver.arrays import Array
 from solver.continuation.small_states import WIDE_MARGIN, expected_depth, settled_state
 from solver.equilibrium.finger import LinearFinger
-from solver.equilibrium.load_path import end
+from solver.equilibrium.load_path import end_of_path
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
@@ -81,7 +81,7 @@ def _small(scenes: Sequence[Scene], fineness: float, shift: bool, step_factor: i
     finger = LinearFinger.of(scenes[0], Sizing(fineness, depth, shift, WIDE_MARGIN))
     for scene in scenes:
         stepwise = scene.viscoelastic and depends_on_way(scene)
-        state = (end if stepwise else settled_state)(scene, finger, step_factor)
+        state = (end_of_path if stepwise else settled_state)(scene, finger, step_factor)
         if finger.reaches_out(state, finger.displacement(state), state.load.depth):
             raise NotConverged("Contact reaches out of the skin that is looked at.")
         yield np.abs(finger.numbers([state])[0])
@@ -94,7 +94,7 @@ def _finite(scenes: Sequence[Scene], fineness: float, shift: bool, step_factor: 
         sizing = replace(low.sizing, fineness=fineness, shift=shift)
         if scene.viscoelastic and depends_on_way(scene):
             finger = meshes.finger(scene, replace(sizing, margin=WIDER))
-            yield np.abs(finger.numbers([end(scene, finger, step_factor)])[0])
+            yield np.abs(finger.numbers([end_of_path(scene, finger, step_factor)])[0])
             continue
         top = solution_on(scene, sizing, low, meshes, step_factor)
         if top.state.reaches_end:

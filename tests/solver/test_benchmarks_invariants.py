@@ -11,7 +11,7 @@ from solver._kernels.compiling import SHEAR_LIMITED, SLIP
 from solver.contact import FrictionLaw, LoadState
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import LinearFinger
-from solver.equilibrium.load_path import march
+from solver.equilibrium.load_path import march_scene
 from solver.equilibrium.load_stepping import sliding_load, solve_full_slip
 from solver.mesh.mesher import Sizing
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
@@ -33,7 +33,7 @@ def histories(finger):
 
 def march_instants(finger, law, loading):
     bound = None if np.isinf(law.tau_max) else law.tau_max
-    return march(replace(finger.scene, friction=Friction(law.mu, bound), loading=loading), finger).instants
+    return march_scene(replace(finger.scene, friction=Friction(law.mu, bound), loading=loading), finger).instants
 
 
 def load_of(law):

@@ -8,7 +8,7 @@ import pytest
 from solver import Friction, Loading, Scene, Solve, solve
 from solver.accuracy.error_estimate import PARTS, Steps
 from solver.equilibrium.finger import LinearFinger
-from solver.equilibrium.load_path import end
+from solver.equilibrium.load_path import end_of_path
 from solver.mesh.mesher import Sizing
 from solver.prediction import COUNT
 from solver.quantities import NAMES
@@ -45,7 +45,7 @@ def test_a_course_that_agrees_with_the_usual_one_by_chance_leaves_the_others_est
 def fine_numbers(scene, fineness, shift):
     """Return the numbers of a scene at small strain in 8 times the usual steps."""
     finger = LinearFinger.of(scene, Sizing(fineness, 1.5, shift, margin=4.0))
-    return finger.all_numbers([end(scene, finger, 8.0)])[0]
+    return finger.all_numbers([end_of_path(scene, finger, 8.0)])[0]
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import pytest
 
 from solver import Friction, Loading, Material, Materials, Relaxation, Scene, Solve, solve
 from solver.equilibrium.finger import KINDS
-from solver.equilibrium.load_path import march
+from solver.equilibrium.load_path import march_scene
 from solver.prediction import History
 from solver.quantities import NAMES
 from solver.response.answer import history
@@ -81,7 +81,7 @@ def test_errors_at_the_ends_of_press_and_break_away_and_of_rates_lie_above_the_t
     prediction = solve(scene)
     sizing = replace(prediction.geometry.sizing, fineness=16.0 if kinematics == "small" else 10.0)
     fine = KINDS[kinematics].of(scene, sizing)
-    truth = course_numbers(history(scene, fine, march(scene, fine, 4.0)))
+    truth = course_numbers(history(scene, fine, march_scene(scene, fine, 4.0)))
     numbers, errors = course_numbers(prediction.history), course_errors(prediction)
     finite = np.isfinite(truth.value)
     assert np.array_equal(finite, np.isfinite(errors.value))
