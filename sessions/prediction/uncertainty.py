@@ -265,7 +265,15 @@ def _present_answers(prediction: SessionPrediction, variant: Variant) -> _Answer
 def _solve_variant(prediction: SessionPrediction, variant: Variant, progress: Progress | None) -> _Answers:
     scenes = [scene_along(row, variant, prediction.options) for row in prediction.trials]
     answers = iter(predict_scenes([scene for scene in scenes if not isinstance(scene, str)], progress))
-    return [(None, scene) if isinstance(scene, str) else (scene.friction.tau_max, next(answers)) for scene in scenes]
+    return [
+        (None, scene) if isinstance(scene, str) else (scene.friction.tau_max, _without_doubt(next(answers)))
+        for scene in scenes
+    ]
+
+
+def _without_doubt(answer: Prediction | str) -> Prediction | str:
+    """Return the answer of a variant, or why no finger can be in it: at the planned depth alone such numbers stay."""
+    return answer if isinstance(answer, str) else doubt_of(answer) or answer
 
 
 def _alternative(

@@ -1,6 +1,6 @@
 """What a report says in sentences: its question, its answer in short, and what would change the sign of r."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from itertools import takewhile
 from typing import Literal
 
@@ -52,25 +52,18 @@ def _in_variant(report: Report, variant: Variant, condition: str) -> str:
     def sed(prediction: PredictionFinding) -> float | None:
         return next((a.sed for a in prediction.alternatives if a.variant == variant), None)
 
-    tried = by_key((p.experiment, a) for p in report.predictions for a in p.alternatives if a.variant == variant)
+    tried = {p.experiment for p in report.predictions for a in p.alternatives if a.variant == variant}
     clauses: list[str] = []
     for experiment in report.experiments:
-        if alternatives := tried.get(experiment.name):
+        if experiment.name in tried:
             fit = _relation(report, experiment, sed)
             text = fit.reason if fit.pearson is None else f"r = {correlation(fit.pearson)}{ends_of(fit)}"
-            doubt = _doubt([bool(alternative.doubt) for alternative in alternatives])
-            clauses.append(f"{experiment.name} {text}, n = {plural(fit.n, 'stimulus', 'stimuli')}{doubt}")
+            clauses.append(f"{experiment.name} {text}, n = {plural(fit.n, 'stimulus', 'stimuli')}")
     if not clauses:
         sizes = [fact.value for fact in report.left_out if condition.endswith(fact.name) and fact.value != NO_ESTIMATE]
         change = f": the change is estimated at {sizes[0]}" if sizes else ""
         return f"{condition}, which was not tried here, the sign of r may differ{change}."
     return f"{condition}, r of the SED with the mean scores: {'; '.join(clauses)}."
-
-
-def _doubt(in_doubt: Sequence[bool]) -> str:
-    """Return how many trials are in a state that no finger can be in, as the end of a sentence; "" where none is."""
-    count_text = f"{sum(in_doubt)} of {plural(len(in_doubt), 'trial')}"
-    return f" ({count_text} in a state that no finger can be in)" if any(in_doubt) else ""
 
 
 def _relation(report: Report, experiment: Experiment, value: _NumberOf) -> Relation:

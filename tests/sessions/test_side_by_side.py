@@ -1,6 +1,7 @@
 """The same trials under both readings, by depth and by force, and at both strains: each held against its own solve."""
 
 import json
+import re
 from dataclasses import replace
 
 import pytest
@@ -95,6 +96,21 @@ def test_a_trial_without_friction_or_force_says_why_in_each_variant():
     assert pick(row, "computed", "force").reason == "The stroke gives no steady normal force."
     (row,) = with_alternatives(predict(replace(friction_analysis, friction=(), strokes=()), plan, options)).trials
     assert {alternative.reason for alternative in row.alternatives} == {"No stroke was found in this trial."}
+
+
+def test_a_trial_pressed_by_its_force_until_tissue_turns_inside_out_has_the_solver_s_sentence_and_no_number():
+    friction_analysis, plan = inputs()
+    pressed = replace(friction_analysis, strokes=(stroke(2, normal_force=2.5), stroke(4, normal_force=5.9)))
+    options = PredictionOptions(course="steady", variants="small", intervals=True)
+    light, deep = (pick(r, "computed", "force") for r in with_alternatives(predict(pressed, plan, options)).trials)
+    friction = Friction(STICKINESS[3].mu, STICKINESS[3].printed_bound * 1e-2)
+    loading = Loading(normal_force=5.9, force_unit="N")
+    warnings = solve(Scene(friction=friction, loading=loading, solve=Solve("small", "steady"))).warnings
+    (sentence,) = (warning for warning in warnings if "turned inside out" in warning)
+    assert re.sub("[0-9.]+", "#", deep.reason) == re.sub("[0-9.]+", "#", sentence)
+    assert deep.interval.reason == deep.reason
+    assert (deep.sed, deep.normal_force, deep.indentation, deep.interval.low) == (None,) * 4
+    assert light.sed > 0
 
 
 def test_where_a_strain_has_no_settled_slide_the_solver_s_sentence_stands_in_its_place(monkeypatch):

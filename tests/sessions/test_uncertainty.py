@@ -47,9 +47,9 @@ def intervals(prediction):
 
 @pytest.fixture(scope="module")
 def with_variants(prediction):
-    """Return the sticky trial with its variants, and the options."""
+    """Return the trial that is hardly sticky with its variants: its force turns no tissue inside out."""
     options = replace(prediction.options, variants="small", variant_intervals=True)
-    alone = replace(prediction, trials=prediction.trials[:1], options=options)
+    alone = replace(prediction, trials=prediction.trials[1:], options=options)
     return with_alternatives(with_intervals(alone))
 
 
@@ -174,7 +174,7 @@ def test_the_other_way_and_every_variant_have_intervals_that_hold_their_seds(wit
 def test_pressed_by_the_force_measured_the_uncertainty_of_that_force_is_in_the_interval(analysis, with_variants):
     (row,) = with_variants.trials
     variant = next(alternative for alternative in row.alternatives if alternative.variant.driven == "force")
-    _, _, normal = friction_draws(analysis.strokes[0], 0, "maximum", LEVEL)
+    _, _, normal = friction_draws(analysis.strokes[1], 1, "maximum", LEVEL)
     least, most = np.quantile(normal, [0.025, 0.975])
     scene = scene_along(row, variant.variant, with_variants.options)
     low, high = seds_of([with_loads(scene, {"force": least}), with_loads(scene, {"force": most})])
@@ -187,7 +187,7 @@ def test_the_depth_that_matches_holds_the_uncertainty_of_force_and_friction(anal
     (row,) = with_variants.trials
     variant = next(alternative for alternative in row.alternatives if alternative.variant.driven == "force")
     assert (row.matching_depth, row.matching_depth_interval) == (variant.indentation, variant.interval.indentation)
-    draws = dict(zip(("mu", "tau_max", "force"), friction_draws(analysis.strokes[0], 0, "maximum"), strict=True))
+    draws = dict(zip(("mu", "tau_max", "force"), friction_draws(analysis.strokes[1], 1, "maximum"), strict=True))
     ends = {name: np.quantile(sample, [0.025, 0.975]).tolist() for name, sample in draws.items()}
     scene = scene_along(row, variant.variant, with_variants.options)
     solutions = settled_predictions([with_loads(scene, {name: end}) for name, pair in ends.items() for end in pair])
@@ -221,7 +221,7 @@ def test_at_finite_strain_draws_lie_where_the_derivatives_carry_them(number):
     analysis, plan = shallow(ground_truth.visit(1), number)
     (row,) = drawn_with(LEVEL, predict(analysis, plan, FINITE)).trials
     interval, scene = row.interval, row.prediction.scene
-    draws = friction_draws(analysis.strokes[0], 0, "maximum", LEVEL)
+    draws = friction_draws(analysis.strokes[1], 1, "maximum", LEVEL)
     mu, tau_max = draws.mu[:60], draws.tau_max[:60]
     seds = np.array(seds_of([with_loads(scene, {"mu": m, "tau_max": t}) for m, t in zip(mu, tau_max, strict=True)]))
     linear = row.sed + interval.by_mu * (mu - row.mu) + interval.by_tau_max * (tau_max - row.tau_max)
@@ -257,6 +257,6 @@ def test_at_finite_strain_no_interval_is_told_where_draws_or_all_have_no_settled
     (row,) = with_intervals(near).trials
     assert row.interval.low is None
     assert "of 60 draws of the friction have no settled state" in row.interval.reason
-    largest = int(np.argmax(friction_draws(analysis.strokes[0], 0, "maximum").mu))
-    mu, tau_max, _ = (column[largest] for column in friction_draws(analysis.strokes[0], 0, "maximum"))
+    largest = int(np.argmax(friction_draws(analysis.strokes[1], 1, "maximum").mu))
+    mu, tau_max, _ = (column[largest] for column in friction_draws(analysis.strokes[1], 1, "maximum"))
     assert settled_predictions([with_loads(row.prediction.scene, {"mu": mu, "tau_max": tau_max})]) == (None,)

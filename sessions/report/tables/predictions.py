@@ -220,7 +220,7 @@ def force_table(report: Report) -> Table | None:
 
 
 _OF_STATE = ("normal_per_mm", "normal_force", "tangential_force")  # the depth to match is that of another state
-_ROUGH = "found on a rough mesh; under the measured force trials are solved with tau_max computed (--variants small)"
+_ROUGH = "found on a rough mesh; a trial that --variants small solves under the measured force has an interval"
 
 
 def direction_table(report: Report) -> Table | None:
