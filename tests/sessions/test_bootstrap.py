@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -27,9 +28,14 @@ NO_ERROR = BootstrapSettings(repeats=4000, gain_error=0.0, cross_talk=0.0, tilt_
 FORCES = ("normal_force", "tangential_force", "peak_normal", "peak_tangential")
 
 
+@cache
+def strokes_of_a_visit():
+    return ground_truth.visit(1).analyse().strokes
+
+
 @pytest.fixture(scope="module")
 def strokes():
-    return ground_truth.visit(1).analyse().strokes
+    return strokes_of_a_visit()
 
 
 def width(interval):
@@ -107,8 +113,8 @@ def drawn_stroke(time, normal=2.0, ratio=0.5, degrees=0.0, noise=0.0, curve=None
     numbers = {"mu_dynamic": np.mean(ratio), "mu_max": np.max(ratio), "zero_drift": 0.0, "area_exponent": 0.0}
     numbers |= {"direction": 1, "heading": degrees, "onset": None, "break_away": None, "slide_onset": None}
     curve = StrokeCurve(*columns, **{"noise": (0.0, 0.0), "quiet": 0.0, **(curve or {})})
-    stroke, steady = ground_truth.visit(1).analyse().strokes[0], (time[0], time[-1])
-    return replace(stroke, curve=curve, steady=steady, **(loads | numbers | changes))
+    steady = (time[0], time[-1])
+    return replace(strokes_of_a_visit()[0], curve=curve, steady=steady, **(loads | numbers | changes))
 
 
 TWO_SECONDS = np.arange(400) / 200.0

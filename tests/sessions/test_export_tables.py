@@ -1,9 +1,13 @@
 """Cells of the exported tables: what an analysis and a prediction hold stands in them, with its unit and its reason."""
 
+import json
+
 import pytest
 from exported_sessions import source_of
 
-from sessions.exchange import ExportSource
+from sessions.exchange import ExportSource, export
+from sessions.exchange.csv_text import ImportRefused
+from sessions.exchange.exported import read_export
 from sessions.exchange.session_tables import tables
 
 
@@ -41,3 +45,13 @@ def test_an_interval_of_the_sed_is_two_cells_or_the_reason_why_there_is_none(sou
             cells = column(with_prediction, "predictions", f"{name}_interval_{suffix}")
             assert cells.values == tuple(values)
             assert cells.unit == ("" if suffix == "by" else "MPa")
+
+
+@pytest.mark.parametrize("later", [{"version": 99}, {"name": "of another program"}])
+def test_an_export_of_another_format_or_a_later_version_is_refused(source, tmp_path, later):
+    folder = export(source, "csv", tmp_path / "out")
+    description = json.loads((folder / "session.json").read_text())
+    description["format"].update(later)
+    (folder / "session.json").write_text(json.dumps(description))
+    with pytest.raises(ImportRefused, match=r"it holds .*; this program reads 'daq-app session' up to version \d"):
+        read_export(folder)
