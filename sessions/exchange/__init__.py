@@ -1,8 +1,8 @@
-"""Files for others: the list of exports, and what each of them is given.
+"""Exports: their list, and the input of each.
 
-A format is a module with `write(source, folder, progress)`; one that can be imported again has
-`find(path)`, which returns what it reads or None, and `read(path)` too.
-A newcomer in `FORMATS` is tested before anyone writes a test for it (`docs/how-to/add-an-export.md`).
+A format is a module with `write(source, folder, progress)`. One that can be imported again also has `find(path)`, which
+returns the path to read or None, and `read(path)`. A new entry of `FORMATS` is tested automatically
+(`docs/how-to/add-an-export.md`).
 """
 
 import importlib
@@ -16,7 +16,7 @@ from sessions.recording import Recording
 
 Progress = Callable[[float], None]  # part done, 0 to 1
 
-# Name to module. A module is imported only when its format is asked for.
+# Name to module. A module is imported only when its format is used.
 FORMATS: Mapping[str, str] = {
     "csv": "sessions.exchange.csv_folder",
     "bids": "sessions.exchange.bids",
@@ -31,17 +31,17 @@ class ExportError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class ExportSource:
-    """A session and the numbers made from it."""
+    """A session and its results."""
 
     recording: Recording
-    analysis: Mapping[str, Any]  # as `analysis.json` holds it, `made_by` included
-    prediction: Mapping[str, Any] | None  # as `prediction.json` holds it; None where nothing was predicted
+    analysis: Mapping[str, Any]  # as in `analysis.json`, with `made_by`
+    prediction: Mapping[str, Any] | None  # as in `prediction.json`; None without predictions
 
 
 def export(source: ExportSource, name: str, folder: Path, progress: Progress = lambda _: None) -> Path:
     """Write a session in the format called `name` into `folder`, which is new or empty, and return it.
 
-    The folder appears when it is whole: stopped half-way nothing is left. Raises ExportError.
+    The folder appears once it is complete; an interrupted export leaves nothing. Raises ExportError.
     """
     if holds_something(folder):
         raise ExportError(f"{folder} is not empty; give a new folder, for nothing is written over")

@@ -1,4 +1,4 @@
-"""A session as a data set of the Brain Imaging Data Structure: behaviour, events, forces, and what was made of them.
+"""A session as a data set of the Brain Imaging Data Structure: behaviour, events, forces and derived tables.
 
 Behavioural experiments (`beh`) as BIDS 1.10 describes them. Forces and torques have no data type of their own there
 yet, so the readings are a continuous recording (`physio`), one file for each stretch without a break. A reading that
@@ -31,11 +31,11 @@ from sessions.recording.manifest import description
 _VERSION = "1.10.0"
 BREAK = 1.0  # a longer silence of the transducer begins a new file [s]
 PIPELINE = "daq-app"
-DERIVED = (  # tables that are made of a recording, in their order
+DERIVED = (  # tables derived from a recording, in their order
     "answers", "positions", "strokes", "friction", "flaws", "decisions", "predictions", "responses", "alternatives",
 )  # fmt: skip
-SOURCE = "sourcedata"  # BIDS lets it hold anything
-_BIDS_COLUMNS = frozenset({"onset", "duration"})  # BIDS itself says what they are
+SOURCE = "sourcedata"  # BIDS allows any content here
+_BIDS_COLUMNS = frozenset({"onset", "duration"})  # described by BIDS itself
 _MARK = Column("simulated", "", "1: transducer or subject were simulated", ())
 
 
@@ -52,7 +52,7 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     task = {"TaskName": names.task, "TaskDescription": f"protocol {recording.plan.protocol}"}
     instructions = task | {"Instructions": " / ".join(block.instruction for block in recording.plan.blocks)}
     _write_table(beh / f"{names.stem}_beh", by_name["trials"], recording, instructions)
-    session = {"DaqAppSession": description(recording)}  # all that is needed to make the session again
+    session = {"DaqAppSession": description(recording)}  # all that is needed to restore the session
     _write_table(beh / f"{names.stem}_events", _events(recording), recording, instructions | session)
     if recording.info is not None:
         _write_readings(recording, beh, names, progress)
@@ -70,18 +70,18 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
 
 
 def find(path: Path) -> Path | None:
-    """Return what `read` reads where `path` is a data set; None elsewhere."""
+    """Return the path for `read` where `path` is a data set; None elsewhere."""
     return path if (path / "dataset_description.json").is_file() else None
 
 
 def read(path: Path) -> ExportedSession:
-    """Return the session of a data set of one subject that `write` wrote. Raises OSError, ValueError."""
+    """Return the session in a data set of one subject written by `write`. Raises OSError, ValueError."""
     event_files = sorted(path.glob("sub-*/beh/*_events.tsv"))
     if len(event_files) != 1:
         raise ValueError(f"it holds the events of {len(event_files)} sessions, and one is needed")
     (event_file,) = event_files
     head = head_of(json_object(read_within_limit(event_file.with_suffix(".json")))["DaqAppSession"])
-    # Unlike `splitlines`, which takes a line separator that somebody typed for a line's end.
+    # Not `splitlines`, which would end a line at a line separator in a typed text.
     text = io.StringIO(read_within_limit(event_file).decode(), newline=None)
     header, *lines = (line.removesuffix("\n").split("\t") for line in text)
     rows_read = (
@@ -93,7 +93,7 @@ def read(path: Path) -> ExportedSession:
 
 
 class _Names:
-    """What the files of a session are called: letters and digits alone."""
+    """Names of a session's files: letters and digits only."""
 
     def __init__(self, recording: Recording) -> None:
         self.subject = f"sub-{_label(recording.plan.subject)}"
@@ -190,7 +190,7 @@ def _write_readings(recording: Recording, folder: Path, names: _Names, progress:
 
 
 def _sampling_frequency(rate: float, block: ReadingBlock) -> float | None:
-    """Return the rate that the device states [Hz], else that of the readings; None of one reading alone."""
+    """Return the rate that the device states [Hz], else that of the readings; None for a single reading."""
     if math.isfinite(rate):
         return rate
     span = float(block.time[-1] - block.time[0])
@@ -198,7 +198,7 @@ def _sampling_frequency(rate: float, block: ReadingBlock) -> float | None:
 
 
 def _stretches(recording: Recording) -> Iterator[tuple[int, ReadingBlock]]:
-    """Yield the readings in order, each block with the number of its stretch without a break, from 1."""
+    """Yield the readings in order, each block with the number of its unbroken stretch, from 1."""
     last_time: float | None = None
     last_number: int | None = None
     stretch = 0
@@ -220,7 +220,7 @@ def _stretches(recording: Recording) -> Iterator[tuple[int, ReadingBlock]]:
 def _rows_with_gaps(
     block: ReadingBlock, last_number: int | None, cells: Iterable[tuple[Any, ...]], width: int, mark: tuple[int, ...]
 ) -> Iterator[tuple[Any, ...]]:
-    """Yield the rows, and a row of n/a for each reading that never arrived; NaN and infinity are written as n/a too."""
+    """Yield the rows, and a row of n/a for each missing reading; NaN and infinity become n/a too."""
     finite = bool(np.isfinite(block.raw).all())
     missing = (NOT_AVAILABLE,) * (width - len(mark)) + mark
     for row in cells:
@@ -231,7 +231,7 @@ def _rows_with_gaps(
 
 @contextmanager
 def _open_gzip(path: Path) -> Generator[TextIO]:
-    """Open a text to be packed without name and time, so that the same session gives the same bytes."""
+    """Open a gzip text without name and time, so that the same session gives the same bytes."""
     with (
         path.open("wb") as raw,
         gzip.GzipFile("", "wb", compresslevel=6, fileobj=raw, mtime=0) as file,
@@ -257,7 +257,7 @@ def _write_table(stem: Path, table: Table, recording: Recording, extra: Mapping[
         table = replace(table, columns=(*table.columns, replace(_MARK, values=(1,) * len(table.rows))))
     with stem.with_name(f"{stem.name}.tsv").open("w", encoding="utf-8", newline="") as file:
         for row in ([column.heading for column in table.columns], *table.rows):
-            # Tabs and line ends have no place in a cell, and a BIDS table knows no quotes.
+            # A BIDS table has no quotes, so cells must not contain tabs and line ends.
             texts = ("" if cell is None else re.sub(r"[\t\r\n]+", " ", str(cell)) for cell in row)
             file.write("\t".join(text or NOT_AVAILABLE for text in texts) + "\n")
     headings = {column.heading: _describe(column) for column in table.columns if column.heading not in _BIDS_COLUMNS}

@@ -43,12 +43,12 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
 
 
 def find(path: Path) -> Path | None:
-    """Return what `read` reads where `path` is such a folder; None elsewhere."""
+    """Return the path for `read` where `path` is such a folder; None elsewhere."""
     return path if (path / DESCRIPTION_FILE).is_file() and not (path / SEALED_FILE).is_file() else None
 
 
 def read(path: Path) -> ExportedSession:
-    """Return the session that `write` put into the folder `path`. Raises OSError, ValueError."""
+    """Return the session written by `write` into the folder `path`. Raises OSError, ValueError."""
     head = head_of(json_object(read_within_limit(path / DESCRIPTION_FILE)))
     rows_read = csv.DictReader(io.StringIO(read_within_limit(path / EVENTS).decode(), newline=""))
     events = tuple(logged_event({name: plain(cell) for name, cell in row.items()}, "kind") for row in rows_read)
@@ -56,7 +56,7 @@ def read(path: Path) -> ExportedSession:
 
 
 def _write_rows(file: TextIO, mark: Sequence[Column], header: list[list[str]], rows: Iterable[Sequence[Any]]) -> None:
-    """Write a header and rows; where they are marked, a column that says so comes first."""
+    """Write a header and rows; with a `mark` its column comes first."""
     write_rows(file, [[*(column.heading for column in mark), *names] for names in header])
     write_rows(file, ([*("yes" for _ in mark), *row] for row in rows))
 
@@ -75,7 +75,7 @@ def _write_readings(recording: Recording, mark: Sequence[Column], path: Path, pr
 
 
 def _read_readings(path: Path) -> Iterator[ReadingBlock]:
-    if not path.is_file():  # a visit that only scored
+    if not path.is_file():  # a visit without forces
         return
     with path.open(encoding="utf-8", newline="") as file:
         yield from read_rows(file, next(file, "").strip().split(","), ",")

@@ -1,8 +1,8 @@
-"""CSV that a spreadsheet takes text for text, rows of foreign files, readings as rows, and the log of a stage.
+"""CSV safe for spreadsheets, rows of foreign files, readings as rows, and the log of a stage.
 
-A spreadsheet runs a cell that begins with `=`, `+`, `-`, `@`, a tab or a carriage return (OWASP, "CSV injection").
-Text that begins like a formula has an apostrophe before it; numbers stay as they are. `plain` gives back the text that
-`harmless` was given, so that an export comes back whole.
+A spreadsheet runs a cell that begins with `=`, `+`, `-`, `@`, a tab or a carriage return (OWASP, "CSV injection"). Text
+that begins like a formula is prefixed with an apostrophe; numbers are unchanged. `plain` reverses `harmless`, so that
+an export can be imported unchanged.
 """
 
 import csv
@@ -25,7 +25,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def harmless(cell: object) -> object:
-    """Return a cell that no spreadsheet runs.
+    """Return a cell that no spreadsheet runs as a formula.
 
     >>> [harmless(cell) for cell in ("=1+1", "-1.5", -1.5, "K3", "'=1")]
     ["'=1+1", '-1.5', -1.5, 'K3', "''=1"]
@@ -34,7 +34,7 @@ def harmless(cell: object) -> object:
 
 
 def plain(text: str) -> str:
-    """Return the text that `harmless` was given.
+    """Return the original text of a cell made by `harmless`.
 
     >>> plain("'=1+1"), plain("'tis")
     ('=1+1', "'tis")
@@ -43,7 +43,7 @@ def plain(text: str) -> str:
 
 
 def write_rows(file: TextIO, rows: Iterable[Sequence[Any]], delimiter: str = ",") -> None:
-    """Write rows to an open file; None is an empty cell. Tables for spreadsheets, with commas, hold no formula."""
+    """Write rows to an open file; None is an empty cell. Tables with commas, for spreadsheets, hold no formula."""
     if delimiter == ",":
         rows = ([harmless(cell) for cell in row] for row in rows)
     csv.writer(file, delimiter=delimiter, lineterminator="\n").writerows(rows)
@@ -58,17 +58,17 @@ _DELIMITERS = (",", ";", "\t")
 
 
 class ImportRefused(Exception):
-    """The file cannot be taken as a recording; one sentence names file, line and what to do."""
+    """The file cannot be imported; one sentence names file, line and remedy."""
 
 
 def content_of(path: Path) -> bytes:
-    """Return what a CSV file holds. Raises ImportRefused where it cannot be read."""
+    """Return the bytes of a CSV file. Raises ImportRefused where it cannot be read."""
     with name_failure(ImportRefused, f"{path} cannot be read"):
         return read_within_limit(path, LARGEST_TABLE)
 
 
 def records(path: Path, content: bytes) -> Iterator[tuple[int, list[str]]]:
-    """Yield line number and cells of every row that is no comment; empty lines are allowed at the end alone."""
+    """Yield line number and cells of every row that is not a comment; empty lines are allowed only at the end."""
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -93,13 +93,13 @@ def records(path: Path, content: bytes) -> Iterator[tuple[int, list[str]]]:
 
 
 def cell_text(cell: str) -> str:
-    """Return what a cell holds, on one line and not too long."""
+    """Return a cell's text on one line, shortened."""
     return " ".join(cell.split())[:40]
 
 
 def number_in(cell: str) -> float | None:
     """Return a cell as a number (nan and infinities too), or None."""
-    if "_" in cell:  # Python reads 1_000 as a number; a data file means none
+    if "_" in cell:  # Python reads 1_000 as a number, but in a data file it is text
         return None
     try:
         return float(cell)
@@ -108,23 +108,23 @@ def number_in(cell: str) -> float | None:
 
 
 def mend_row(*cells: str) -> str:
-    """Return what to do where cells of a row hold no numbers. A comma could stand before thousands or a fraction."""
+    """Return the remedy where cells of a row hold no numbers. A comma may separate thousands or a fraction."""
     commas = any(re.fullmatch(r"[+-]?\d+,\d+", cell.strip()) for cell in cells)
     return "save the file with decimal points" if commas else "mend or remove the row"
 
 
-_PART = 16_384  # rows at once
+_PART = 16_384  # rows in one read
 NOT_AVAILABLE = "n/a"
 RAW = tuple(f"raw_{axis}" for axis in range(1, 7))
 _EXACT = np.dtype(
     [("sequence", "i8"), ("counter", "i8"), ("status", "i8"), ("time", "f8"), ("received", "i8")]
     + [(name, "f8") for name in RAW]
 )
-STORED = _EXACT.names or ()  # what a reading is; the wrench is made from it
+STORED = _EXACT.names or ()  # the columns of a reading; the wrench is computed from them
 
 
 def columns(calibration: Calibration) -> tuple[Column, ...]:
-    """Return what the columns of a row are, without values."""
+    """Return the columns of a row, without values."""
     raw_units = [unit for _, unit in WRENCH] if calibration.raw_unit == "N, N mm" else [calibration.raw_unit] * 6
     meanings = [
         ("sequence", "", "record number given by the device; missing numbers are readings that never arrived"),
@@ -143,21 +143,21 @@ def columns(calibration: Calibration) -> tuple[Column, ...]:
 
 def rows(block: ReadingBlock, calibration: Calibration) -> Iterator[tuple[Any, ...]]:
     """Yield the row of each reading, in the order of `columns`."""
-    with np.errstate(invalid="ignore", over="ignore"):  # what the device sent is written, whatever it is
+    with np.errstate(invalid="ignore", over="ignore"):  # any value of the device is written
         wrench = calibration.wrench(block.raw, np.zeros(6))
     columns = (block.sequence, block.counter, block.status, block.time, block.received_ns)
     return zip(*(column.tolist() for column in columns), *block.raw.T.tolist(), *wrench.T.tolist(), strict=True)
 
 
 def read_rows(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Iterator[ReadingBlock]:
-    """Yield the readings in rows whose columns are called `names` (units at their end are no part of them).
+    """Yield the readings in rows with columns `names` (which may end with a unit).
 
-    Rows without a sequence number, of readings that never arrived, are left out; n/a is a NaN. Raises ValueError.
+    Rows without a sequence number, for missing readings, are left out; n/a is read as NaN. Raises ValueError.
     """
     positions = [_place(name, names) for name in STORED]
     present = (line.replace(NOT_AVAILABLE, "nan") for line in lines if not line.startswith(NOT_AVAILABLE))
     while chunk := list(islice(present, _PART)):
-        # usecols picks the columns in the order given, whatever their order in the file.
+        # usecols returns columns in the given order, independent of the file's.
         table: Any = np.atleast_1d(np.loadtxt(chunk, _EXACT, delimiter=delimiter, usecols=positions, comments=None))
         raw = np.column_stack([table[name] for name in RAW])
         sequence, counter, status, time, received = (np.ascontiguousarray(table[name]) for name in STORED[:5])
@@ -173,11 +173,11 @@ def _place(name: str, names: Sequence[str]) -> int:
 
 _DISPLACEMENT = "displacement_mm"
 _WIDTH = "contact_width_mm"
-CLOCKS = ("time_s", "received_ns", "sequence")  # as `readings.csv` of an export calls them
+CLOCKS = ("time_s", "received_ns", "sequence")  # named as in `readings.csv` of an export
 
 
 def displacement_log(path: Path) -> DisplacementLog:
-    """Return a stage's log from a CSV file with a header; columns not needed are left alone. Raises ImportRefused."""
+    """Return a stage's log from a CSV file with a header; other columns are ignored. Raises ImportRefused."""
     rows = records(path, content_of(path))
     _, header = next(rows, (0, [""]))
     names = [cell.strip() for cell in header]

@@ -1,4 +1,4 @@
-"""A session that was exported by this program comes back whole: read, written as a session, and compared."""
+"""Import of sessions exported by this program: read, written as a session, and compared."""
 
 import csv
 import errno
@@ -30,7 +30,7 @@ from sessions.strokes.decisions import DECISIONS
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """What an export says of the session besides readings and events, as plain data."""
+    """An export's data on the session other than readings and events, as plain data."""
 
     simulated: str | None  # the sentence
     plan: Mapping[str, Any]
@@ -42,24 +42,24 @@ class Head:
 
 @dataclass(frozen=True, slots=True)
 class ExportedSession:
-    """A session as an export holds it."""
+    """A session in an export."""
 
     form: str  # name of the export
     path: Path
     head: Head
     events: tuple[LoggedEvent, ...]
-    blocks: Callable[[], Iterator[ReadingBlock]]  # the readings in their order, read when asked for
-    side_files: Mapping[str, bytes]  # what people set beside the recording, by the name of its file
+    blocks: Callable[[], Iterator[ReadingBlock]]  # the readings in order, read on demand
+    side_files: Mapping[str, bytes]  # files with people's settings and decisions, by name
 
 
 def side_files(folder: Path) -> dict[str, bytes]:
-    """Return the files that people set beside a recording, by name. Raises RecordingError where one cannot be read."""
+    """Return a session's files with people's settings and decisions, by name. Raises RecordingError."""
     contents = {name: bytes_of(folder / name) for name in (DECISIONS, GAIN_ERROR)}
     return {name: content for name, content in contents.items() if content}
 
 
 def head_of(description: Mapping[str, Any]) -> Head:
-    """Return the head that a `session.json` holds. Raises ValueError where it is none of ours, or a later one."""
+    """Return the head in a `session.json`. Raises ValueError for a foreign or later format."""
     check_format(description.get("format"))
     digests = description["sha256"]
     return Head(
@@ -73,10 +73,10 @@ def head_of(description: Mapping[str, Any]) -> Head:
 
 
 def restore(session: ExportedSession, folder: Path) -> tuple[str, ...]:
-    """Write an exported session into a new folder, and return a sentence for each thing that is not as it was.
+    """Write an exported session into a new folder, and return a sentence for each difference.
 
-    What had been lost before the export, and what was changed after it, is written into the log and so named ever
-    after. Raises RecordingError where the folder cannot be written, ValueError where the export is damaged.
+    Losses before the export, and changes after it, are written into the log, so that every later reader sees them.
+    Raises RecordingError where the folder cannot be written, ValueError where the export is damaged.
     """
     head = session.head
     plan = as_type(head.plan, SessionPlan)
@@ -128,15 +128,15 @@ _DAMAGED = (
 
 @dataclass(frozen=True, slots=True)
 class RestoreResult:
-    """How much of a session came back from an export, and what differs."""
+    """The amount of data restored from an export, and the differences."""
 
     readings: int
     events: int
-    differences: tuple[str, ...]  # what is not as it was recorded, a sentence each
+    differences: tuple[str, ...]  # a sentence for each difference from the recording
 
 
 def read_export(path: Path) -> ExportedSession | None:
-    """Return the session in an export of ours; None for anything else, such as a CSV file. Raises ImportRefused."""
+    """Return the session in an export of this program; None for other files, as a CSV file. Raises ImportRefused."""
     if (path / LIVE_FILE).exists():
         raise ImportRefused(f"{path} is a session folder already: every verb takes it as it is")
     if path.name == LIVE_FILE:
@@ -156,7 +156,7 @@ def read_export(path: Path) -> ExportedSession | None:
 
 
 def import_session(source: ExportedSession, folder: Path) -> RestoreResult:
-    """Make a session folder of an export; nothing is left behind where it is damaged.
+    """Make a session folder from an export; a damaged export leaves nothing behind.
 
     Raises ImportRefused for a damaged export, RecordingError for a folder that cannot be written.
     """
@@ -176,7 +176,7 @@ def import_session(source: ExportedSession, folder: Path) -> RestoreResult:
 
 
 def _refusal(problem: str, error: Exception) -> ImportRefused:
-    """Return a sentence on an export: the problem, its cause, and what to do."""
+    """Return a refusal of an export: the problem, its cause and the remedy."""
     cause, advice = " ".join(str(error).split()), "export the session anew"
     if isinstance(error, KeyError):
         cause += " is missing"

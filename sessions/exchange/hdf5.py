@@ -1,6 +1,6 @@
-"""A session as one HDF5 file: the sealed copy, which describes itself, and the tables made from it."""
+"""A session as one HDF5 file: the sealed copy, which describes itself, and the derived tables."""
 
-# h5py brings no types; every array is given its type where it leaves this file.
+# h5py brings no types; arrays get their types where they leave this file.
 
 import json
 from collections.abc import Iterator
@@ -22,12 +22,12 @@ from sessions.recording.schema import COLUMNS, SEALED_FILE, check_format
 from sessions.recording.sealed_copy import DataSet, read_texts, texts, write_copy
 from sessions.strokes.decisions import DECISIONS
 
-_PART = 65_536  # readings at once
-SIDE_FILES = {  # data set and meaning of each file that people set beside a recording
+_PART = 65_536  # readings in one block
+SIDE_FILES = {  # data set and meaning of each file with people's settings and decisions
     DECISIONS: ("derived/decisions", "decisions.jsonl, what people decided about strokes"),
     GAIN_ERROR: ("derived/calibration_error", "calibration-error.json, as somebody set it"),
 }
-IN_THE_COPY = "trials"  # the table that the sealed copy holds itself
+IN_THE_COPY = "trials"  # the table already in the sealed copy
 
 
 def write(source: ExportSource, folder: Path, progress: Progress) -> None:
@@ -45,14 +45,14 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
 
 
 def find(path: Path) -> Path | None:
-    """Return the file that `read` reads where `path` is it or the folder that holds it; None elsewhere."""
+    """Return the file for `read` where `path` is that file or its folder; None elsewhere."""
     if path.suffix in {".h5", ".hdf5"} and not path.is_dir():
         return path
     return path / SEALED_FILE if (path / SEALED_FILE).is_file() else None
 
 
 def read(path: Path) -> ExportedSession:
-    """Return the session that a file written by `write`, or a sealed copy, holds. Raises OSError, ValueError."""
+    """Return the session in a file written by `write`, or in a sealed copy. Raises OSError, ValueError."""
     with h5py.File(path, "r") as file:
         form = _text(file.attrs.get("format", b""))
         check_format({"name": form, "version": int(file.attrs.get("format_version", 0))} if form else None)
@@ -61,7 +61,7 @@ def read(path: Path) -> ExportedSession:
             _text(file.attrs["SIMULATED"]) if "SIMULATED" in file.attrs else None,
             *(cast("Any", json_value(_text(_array(file, f"head/{name}")[0]))) for name in names),
             losses=tuple(map(_text, _array(file, "head/losses"))),
-            digest=None,  # the file's own check sums guard it
+            digest=None,  # the file has its own check sums
         )
         columns = [_array(file, f"events/{name}").tolist() for name in ("number", "time_ns", "trial", "readings")]
         files = {
@@ -98,7 +98,7 @@ def _blocks(path: Path) -> Iterator[ReadingBlock]:
 
 
 def _data_set(table: str, column: Column) -> DataSet:
-    """Return a column as a data set: NaN, or an empty text, where there is nothing."""
+    """Return a column as a data set, with NaN or an empty text for missing values."""
     name, note = f"{table}/{column.name}", f"{column.meaning}; empty or NaN where unknown"
     values = column.complete_values
     if column.kind is str:

@@ -1,4 +1,4 @@
-"""A foreign CSV file becomes a session: its columns from header or statement, every reading, the file beside them."""
+"""Import of a foreign CSV file as a session: columns from header or options, every reading, the original file."""
 
 import hashlib
 import itertools
@@ -42,10 +42,10 @@ class ColumnsUnknown(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """Where the time and the six axes stand in a row, and what a unit of each is worth."""
+    """Positions of the time and the six axes in a row, and their units."""
 
-    names: tuple[str, ...]  # of all columns, as the file or the options call them
-    time: int | None  # position of the time; None where there is none
+    names: tuple[str, ...]  # of all columns, from the file or the options
+    time: int | None  # position of the time; None without one
     time_unit: str
     axes: tuple[int, ...]  # positions of Fx Fy Fz Tx Ty Tz
     units: tuple[str, str]  # of forces and of torques
@@ -53,7 +53,7 @@ class Columns:
 
     @property
     def scales(self) -> tuple[float, ...]:
-        """What one unit of each axis is in N or N mm."""
+        """Factor of each axis' unit to N or N mm."""
         force, torque = self.units
         return (FORCE_UNITS[force],) * 3 + (TORQUE_UNITS[torque],) * 3
 
@@ -69,8 +69,8 @@ def columns(
 ) -> Columns:
     """Return the columns of a file `width` columns wide.
 
-    `header` is its first row, None where that holds numbers already. `axes` names the columns from the first on ("-"
-    for one that is neither), and `units` those of forces and torques, as stated. Raises ColumnsUnknown.
+    `header` is its first row, None where that holds numbers. `axes` names the columns from the first on ("-" for one
+    that is neither), and `units` those of forces and torques, as stated by the user. Raises ColumnsUnknown.
     """
     headings = [_heading(cell) for cell in header or ()]
     if axes is not None and len(axes) > width:
@@ -112,7 +112,7 @@ def columns(
 
 
 def _heading(cell: str) -> tuple[str, str | None]:
-    """Return the axis that a heading names, and its unit without blanks and dots, None where it names none.
+    """Return the axis of a heading, and its unit without blanks and dots, None without a unit.
 
     >>> _heading("Mz [N m]"), _heading("time"), _heading("remark")
     (('Tz', 'Nm'), ('t', None), ('-', None))
@@ -126,7 +126,7 @@ def _heading(cell: str) -> tuple[str, str | None]:
 
 
 def _common_unit(quantity: str, header_units: set[str | None], option: str | None, factors: Mapping[str, float]) -> str:
-    """Return the one unit in which the forces, or the torques, are."""
+    """Return the common unit of the forces, or of the torques."""
     names = header_units - {None}
     units = ", ".join(factors)
     if len(names) > 1 or (names and None in header_units and option is None):
@@ -144,13 +144,13 @@ def _common_unit(quantity: str, header_units: set[str | None], option: str | Non
 
 
 ORIGINAL_FILE = "original.csv"
-RATE_TOLERANCE = 0.01  # relative difference allowed between a stated rate and that of the file's times [-]
+RATE_TOLERANCE = 0.01  # relative difference allowed between a stated rate and the rate of the file's times [-]
 UNEVEN = 0.05  # relative spread of time steps from which there is no single rate [-]
 _FEWEST = 2
 _LONGEST = 9e9  # of a recording [s]: a session's clock counts nanoseconds in 64 bits
-FASTEST = 1e6  # readings a second [Hz]: ten times those of the fastest device we drive
+FASTEST = 1e6  # readings a second [Hz]: ten times the fastest supported device
 GREATEST = 1e18  # of a time, force or torque: a thousand times the microseconds since 1970, and no product overflows
-_SIMULATED = "SIMULATED"  # at the head of whatever came from a simulator
+_SIMULATED = "SIMULATED"  # at the head of files from a simulator
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,15 +158,15 @@ class ImportOptions:
     """What the user states about the file; None where nothing was stated."""
 
     units: tuple[str, str] | None = None  # of forces and torques, such as ("N", "Nmm")
-    axes: tuple[str, ...] | None = None  # what the columns are, from the first on: t Fx Fy Fz Tx Ty Tz or -
+    axes: tuple[str, ...] | None = None  # the columns, from the first on: t Fx Fy Fz Tx Ty Tz or -
     normal: str | None = None  # axis along which pressing is positive, such as "-z"
     height: float | None = None  # of the stimulus's face above the transducer's origin [mm]
     rate: float | None = None  # readings a second [Hz]
-    zeroed: bool = False  # the file's zeros are those of the unloaded transducer
+    zeroed: bool = False  # zero in the file is the unloaded transducer
     subject: str = "unknown"  # a code, never a name
 
     def __post_init__(self) -> None:
-        """Check what can be checked without the file. Raises SettingsError."""
+        """Check the options that do not depend on the file. Raises SettingsError."""
         if self.normal is not None and self.normal not in NORMALS:
             raise SettingsError(f'--normal "{self.normal}" is not allowed: it must be one of {", ".join(NORMALS)}')
         check_range("--height", self.height, *HEIGHTS, "mm")
@@ -179,17 +179,17 @@ class ImportOptions:
 
 @dataclass(frozen=True, slots=True)
 class ImportResult:
-    """The session that an import made, and what it had to assume."""
+    """The imported session, and the assumptions made."""
 
     folder: Path
     readings: int
     rate: float  # readings a second [Hz]
     defaults: tuple[str, ...]  # values nobody stated, a sentence each
-    extra: tuple[str, ...]  # columns kept in the original file alone
+    extra: tuple[str, ...]  # columns kept only in the original file
 
 
 def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -> ImportResult:
-    """Make a session folder of a CSV file; nothing is written before all of the file was understood.
+    """Make a session folder from a CSV file; nothing is written before the whole file is parsed.
 
     Raises ImportRefused for the file, SettingsError for an option against it, RecordingError for an unwritable folder.
     """
@@ -238,7 +238,7 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
 
 
 def _table(path: Path, content: bytes, options: ImportOptions) -> tuple[Columns, Array, list[int]]:
-    """Return the columns, the numbers (n, columns; nan in extra ones) and the line each row stands on."""
+    """Return the columns, the numbers (n, columns; nan in extra ones) and the line number of each row."""
     following = records(path, content)
     first_record = next(following, None)
     if first_record is None:
@@ -263,7 +263,7 @@ def _table(path: Path, content: bytes, options: ImportOptions) -> tuple[Columns,
 
 
 def _row(path: Path, line: int, cells: Sequence[str], width: int, column_names: dict[int, str]) -> list[float]:
-    """Return a row's numbers; nan in columns that are not used."""
+    """Return a row's numbers; nan in unused columns."""
     if len(cells) != width:
         raise ImportRefused(
             f"{path}, line {line} has {len(cells)} columns and not {width}: complete the row, or remove it"
@@ -282,7 +282,7 @@ def _row(path: Path, line: int, cells: Sequence[str], width: int, column_names: 
 def _times(
     path: Path, layout: Columns, rows: Array, lines: list[int], options: ImportOptions
 ) -> tuple[Array, float, Origin]:
-    """Return times (n,) [s] from 0 on, the rate [Hz], and where that is from."""
+    """Return times (n,) [s] from 0 on, the rate [Hz], and its origin."""
     if layout.time is None:
         if options.rate is None:
             raise SettingsError(f"{path} has no column of times: give --rate, the readings a second")
@@ -312,7 +312,7 @@ def _times(
 
 
 def _says_simulated(content: bytes, names: Sequence[str]) -> bool:
-    """Say whether a comment at the file's head, or a column, says that it came from a simulator."""
+    """Say whether a comment at the file's head, or a column name, marks it as simulated."""
     comments = [line for line in content[:4096].decode(errors="replace").splitlines() if line.startswith(COMMENT)]
     return any(_SIMULATED in text for text in (*comments, *names))
 

@@ -1,4 +1,4 @@
-"""A session as one file of Neurodata Without Borders: readings, wrench, trials, events and the numbers made from them.
+"""A session as one file of Neurodata Without Borders: readings, wrench, trials, events and results.
 
 Needs the optional library pynwb. Raw numbers and forces are acquired time series on the session clock; trials,
 answers, strokes, friction and predictions are tables.
@@ -59,11 +59,11 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
         keywords=["friction", "touch", "psychophysics", *(["SIMULATED"] if mark else [])],
         source_script=f"daq-app {source.analysis['made_by'].get('daq-app', '')}",
         source_script_file_name="daq-app export",
-        notes=compact_json(  # all that the file lacks
+        notes=compact_json(  # everything that the file otherwise lacks
             {
                 **document,
                 "log": [asdict(event) for event in recording.events],
-                # How uncertain each axis' gain is, which the intervals hold, and whether somebody set that.
+                # The uncertainty of each axis' gain, included in the intervals, and its origin.
                 "calibration_error": {name: bootstrap.get(name) for name in ("gain_error", "gain_error_origin")},
             }
         ),
@@ -71,7 +71,7 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
             subject_id=plan.subject,
             species="Homo sapiens",
             sex="U",
-            age="P0D/",  # from no days on: nobody asked
+            age="P0D/",  # from 0 days on: age is not recorded
             description=f"{mark}A code; nothing personal is recorded, age and sex among it.",
         ),
     )
@@ -93,7 +93,7 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
 
 
 def _add_readings(file: "NWBFile", recording: Recording, first_ns: int, mark: str) -> None:
-    """Add raw numbers and wrench on the device's clock, laid on the session's at the first reading."""
+    """Add raw values and wrench on the device's clock, aligned with the session clock at the first reading."""
     from pynwb import TimeSeries
 
     info = recording.info
@@ -105,13 +105,13 @@ def _add_readings(file: "NWBFile", recording: Recording, first_ns: int, mark: st
         description=f"{mark}{info.model} ({info.driver}), serial {info.serial}, {info.rate:g} readings a second",
     )
     calibration = info.calibration
-    with np.errstate(invalid="ignore", over="ignore"):  # what the device sent is written, whatever it is
+    with np.errstate(invalid="ignore", over="ignore"):  # any value of the device is written
         wrench = calibration.wrench(block.raw, np.zeros(6))
     start = (int(block.received_ns[0]) - first_ns) * 1e-9
     clock: dict[str, Any] = {"timestamps": block.time - block.time[0] + start}
     steps = set(np.diff(block.time).round(9).tolist())
-    if len(steps) == 1 and steps != {0.0}:  # no gap, and no reading off its place
-        rate = (len(block) - 1) / float(block.time[-1] - block.time[0])  # which the device may state wrongly, or not
+    if len(steps) == 1 and steps != {0.0}:  # no gaps and even steps
+        rate = (len(block) - 1) / float(block.time[-1] - block.time[0])  # the device may state a wrong rate, or none
         clock = {"starting_time": start, "rate": info.rate if math.isclose(rate, info.rate, rel_tol=1e-5) else rate}
     unit = "see comments" if calibration.raw_unit == RAW_WRENCH else calibration.raw_unit
     raw = TimeSeries(
@@ -133,7 +133,7 @@ def _add_readings(file: "NWBFile", recording: Recording, first_ns: int, mark: st
 
 
 def _add_trials(file: "NWBFile", recording: Recording, first_ns: int) -> None:
-    """Add the span of each trial's take that counts; all trials stand in the table of that name."""
+    """Add the span of each trial's valid take; the table "trials" has all trials."""
     records = [record for record in recording.trials if record.take is not None and record.take.stop_ns is not None]
     if not records:
         return
@@ -169,10 +169,10 @@ def _events(recording: Recording, first_ns: int) -> Table:
 
 
 def _dynamic(table: Table, mark: str) -> object:
-    """Return a table as NWB holds it: NaN, or an empty text, where there is nothing."""
+    """Return a table for NWB, with NaN or an empty text for missing values."""
     from hdmf.common import DynamicTable, VectorData
 
-    # Texts as objects: of a list NumPy makes an array in which each text takes the room of the longest.
+    # Texts are objects: in a NumPy array of a list each text takes the space of the longest.
     columns = [
         VectorData(
             name=column.heading,
@@ -186,9 +186,9 @@ def _dynamic(table: Table, mark: str) -> object:
 
 
 def _utc(recording: Recording, instant_ns: int) -> datetime:
-    """Return the date of an instant of the session clock; time of a SimulatedClock passes as the date's."""
+    """Return the date of an instant of the session clock; a SimulatedClock counts as real time."""
     creation = datetime.fromisoformat(str(recording.provenance["created_utc"]))
     clock = recording.provenance.get("clock")
-    if clock is None:  # how the session clock goes with the date was not recorded: only when it began
+    if clock is None:  # the session clock's offset to the date was not recorded, only the date of its start
         return creation
     return creation + timedelta(seconds=(instant_ns - int(clock["now_ns"])) * 1e-9 / (float(clock["factor"]) or 1.0))

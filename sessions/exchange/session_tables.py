@@ -1,6 +1,6 @@
 """A session as tables: trials, answers, strokes, friction, predictions; every column with its unit and its meaning.
 
-What is no field of a record stands in `columns.toml` beside this file.
+Columns that are not fields of a record are described in `columns.toml`.
 """
 
 import hashlib
@@ -33,7 +33,7 @@ def _columns_of(name: str) -> Columns:
 
 
 def _prediction_cells(prediction: Mapping[str, Any], row: Mapping[str, Any]) -> dict[str, Cell]:
-    """Return options, scene and mesh of one trial's prediction, as cells of the columns behind `wall_s`."""
+    """Return options, scene and mesh of one trial's prediction, as cells of the columns after `wall_s`."""
     options: Mapping[str, Any] = prediction.get("options") or {}
     area: Mapping[str, Any] = prediction.get("area") or {}
     table: Mapping[str, Any] | None = prediction.get("scene")
@@ -55,7 +55,7 @@ def _prediction_cells(prediction: Mapping[str, Any], row: Mapping[str, Any]) -> 
 
 
 def _columns(record: type, name: str) -> dict[str, tuple[str, str]]:
-    """Return the meanings that the fields of a record have, and further columns behind some of them."""
+    """Return the meanings of a record's fields, with further columns after some of them."""
     further: Mapping[str, Mapping[str, list[str]]] = _COLUMNS["further"].get(name, {})
     columns: dict[str, tuple[str, str]] = {}
     for field, (unit, meaning) in meanings(record).items():
@@ -85,7 +85,7 @@ EACH_EVENT = "a row for each thing that happened, in order"
 
 
 def heading(name: str, unit: str) -> str:
-    """Return a column's name with its unit at the end, in letters that any program takes.
+    """Return a column's name with its unit at the end, in characters that any program accepts.
 
     >>> heading("speed", "mm/s"), heading("torque", "N mm"), heading("mu", "")
     ('speed_mm_per_s', 'torque_Nmm', 'mu')
@@ -95,7 +95,7 @@ def heading(name: str, unit: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column; None in it is a number that honesty does not allow, or a thing that is not there."""
+    """One column; None is a withheld number or a missing value."""
 
     name: str
     unit: str  # "" for none
@@ -104,19 +104,19 @@ class Column:
 
     @property
     def heading(self) -> str:
-        """The name with the unit at its end."""
+        """The name with the unit as a suffix."""
         return heading(self.name, self.unit)
 
     @property
     def kind(self) -> type[str] | type[float] | type[int]:
-        """What the values are: whole numbers only where none is missing."""
+        """Type of the values: whole numbers only if none is missing."""
         if any(isinstance(value, str) for value in self.values):
             return str
         return float if any(value is None or isinstance(value, float) for value in self.values) else int
 
     @property
     def complete_values(self) -> list[Any]:
-        """The values as one kind; an empty text or NaN where there is nothing."""
+        """The values as one type; an empty text or NaN where missing."""
         kind = self.kind
         return [("" if kind is str else math.nan) if value is None else kind(value) for value in self.values]
 
@@ -136,7 +136,7 @@ class Table:
 
 
 def tables(source: ExportSource) -> tuple[Table, ...]:
-    """Return every table of a session but those of events and readings; predictions only where they were stored."""
+    """Return all tables of a session except events and readings; predictions only where stored."""
     analysis = source.analysis
     flaws = [{"flaw": row["name"], **_without(row, "name")} for row in analysis["flaws"]]
     of_model, decisions = "what the model is given: a row for each trial with a stroke", analysis.get("decisions")
@@ -153,7 +153,7 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
 
 
 def _predictions(prediction: Mapping[str, Any]) -> Iterable[Table]:
-    """Yield the predictions, the quantities at the ending, and the same trials predicted otherwise, where these are."""
+    """Yield the predictions, the quantities at the ending, and the variants, where there are any."""
     rows = [
         {
             **_without(row, *_SUBTABLES),
@@ -168,7 +168,7 @@ def _predictions(prediction: Mapping[str, Any]) -> Iterable[Table]:
     responses = [
         {"trial": row["trial"], "quantity": name, **response}
         for row in prediction["trials"]
-        for name, response in (row.get("solver") or {}).get("responses", {}).items()  # which older ones do not hold
+        for name, response in (row.get("solver") or {}).get("responses", {}).items()  # absent in older documents
     ]
     if responses:
         yield _table("responses", "every quantity at the ending for each predicted trial", responses, RESPONSE)
@@ -197,7 +197,7 @@ def _without(row: Mapping[str, Any], *names: str) -> dict[str, Any]:
 
 
 def _sed_interval(name: str, interval: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Return the columns of an interval, where one was asked for: its ends, how it was found, or why it is none."""
+    """Return the columns of an interval, if requested: its ends and its method, or why it is missing."""
     if interval is None:
         return {}
     limits = None if interval["low"] is None else (interval["low"], interval["high"])
@@ -205,7 +205,7 @@ def _sed_interval(name: str, interval: Mapping[str, Any] | None) -> dict[str, An
 
 
 def _force_intervals(interval: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Return the columns of the intervals of a state's forces, where they were asked for."""
+    """Return the columns of the intervals of a state's forces, if requested."""
     forces = ("normal_force", "tangential_force")
     return {} if interval is None else {f"{name}_interval": interval.get(name) for name in forces}
 
@@ -254,7 +254,7 @@ def logged_event(cells: Mapping[str, str], kind_column: str) -> LoggedEvent:
 
 
 def answers(recording: Recording) -> Table:
-    """Return a row for each answer a subject gave, with all that was recorded of it but its positions."""
+    """Return a row for each answer a subject gave, with all recorded data except its positions."""
     rows = [
         {"trial": event.trial, "time": event.time_ns, "kind": event.kind, **_without(event.data, "positions")}
         for event in recording.events
@@ -275,7 +275,7 @@ def positions(recording: Recording) -> Table:
 
 
 def _zero(recording: Recording, trial: int, start_ns: int | None) -> tuple[float | None, ...]:
-    """Return the wrench of the last unloaded stretch measured in the take that counts; None for each where none was."""
+    """Return the wrench of the last unloaded stretch measured in the valid take; None for each axis without one."""
     zero: tuple[float | None, ...] = (None,) * 6
     for event in recording.events:
         in_take = start_ns is not None and event.time_ns >= start_ns
@@ -302,9 +302,9 @@ def _strokes(analysis: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _friction(analysis: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the friction of each trial, with the interval of the number that the model gets, its kind named.
+    """Return the friction of each trial, with the interval of the model's number, and its method.
 
-    That of mu is of the mean or of the maximum, as `rule` says: the bootstrap's, where the analysis holds that.
+    The interval of mu is of the mean or the maximum, by `rule`, from the bootstrap where the analysis has it.
     """
     bootstrap: Mapping[str, Any] = analysis.get("bootstrap") or {}
     strokes: Sequence[Mapping[str, Any]] = bootstrap.get("strokes") or ()
@@ -328,7 +328,7 @@ def _friction(analysis: Mapping[str, Any]) -> list[dict[str, Any]]:
 def _table(
     name: str, meaning: str, rows: Sequence[Mapping[str, Any]], meanings: Mapping[str, tuple[str, str]]
 ) -> Table:
-    """Return plain data as a table: the columns with a known meaning first, then any others the rows hold."""
+    """Return plain data as a table: the columns with a known meaning first, then any others in the rows."""
     flat = [dict(_flat(row)) for row in rows]
     names = dict.fromkeys(name for parts in map(_names, meanings) for name in parts)
     names.update(dict.fromkeys(name for row in flat for name in row))
@@ -337,13 +337,13 @@ def _table(
         description = meanings.get(column) or meanings.get(column.rsplit("_", 1)[0])
         unit, text = description or ("", "see docs/session-format.md")
         columns.append(Column(column, unit, text, tuple(row.get(column) for row in flat)))
-    if flat:  # what is in no row of this session is left out
+    if flat:  # columns without a value in this session are left out
         columns = [c for c in columns if c.name in flat[0] or any(value is not None for value in c.values)]
     return Table(name, meaning, tuple(columns))
 
 
 def _names(column: str) -> tuple[str, ...]:
-    """Return the columns that hold a value: two of a span or an interval."""
+    """Return the columns of a value: two for a span or an interval."""
     if column == "steady":
         return ("steady_start", "steady_stop")
     return (f"{column}_low", f"{column}_high") if column.endswith(("_interval", "_bootstrap")) else (column,)

@@ -1,4 +1,4 @@
-"""From the friction of a session's strokes to what the model predicts: the only door to the solver.
+"""From the friction of a session's strokes to the model's predictions: the only access to the solver.
 
 Each trial becomes a scene: its measured friction, its block's indentation, its direction and speed, and one finger.
 """

@@ -1,9 +1,9 @@
-"""From a quantity at the receptor to the firing of an SA-II afferent: an illustration with declared parameters.
+"""From a quantity at the receptor to the firing of an SA-II afferent: an illustration with stated parameters.
 
-No fitted map from the SED, or any other quantity, to the rate of a human SA-II afferent was found in the literature.
-This one is the simplest that has what such units show: firing at rest, a static and a dynamic part, slow adaptation,
-regular intervals. Its order of surfaces in the settled state is that of the quantity's size, as long as none lies at a
-bound: what it adds is the course in time.
+The literature has no fitted map from the SED, or any other quantity, to the rate of a human SA-II afferent. This map is
+the simplest with the properties of such units: resting discharge, a static and a dynamic part, slow adaptation, regular
+intervals. In the settled state it orders surfaces by the size of the quantity, unless a rate is at a bound; what it
+adds is the time course.
 """
 
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ _THINNING = 10  # steps of the integration for one stored rate
 
 _EDIN_2004 = "Edin 2004, J. Neurophysiol. 92:3233"
 _SAAL_2023 = "Saal, Birznieks & Johansson 2023, eLife 89616"
-# The threshold of each family of quantities, in its unit: what 1 % strain makes in the published dermis, E = 0.08 MPa.
+# Threshold of each family of quantities, in its unit: the value at 1 % strain in the published dermis, E = 0.08 MPa.
 _ENERGY = 4e-6, "SED of 1 % strain in the published dermis, E e^2 / 2 with E = 0.08 MPa"
 _STRAIN = 0.01, "1 % strain"
 _STRESS = 8e-4, "stress of 1 % strain in the published dermis, E e with E = 0.08 MPa"
@@ -43,7 +43,7 @@ class AfferentSettings:
     follows x with the time constant: da/dt = (x - a) / adaptation_time.
     """
 
-    # Of each its unit ("": the quantity's own) and what it rests on; no authority is claimed for the numbers.
+    # Each has its unit ("": the quantity's) and its basis; the numbers claim no authority.
     quantity: str = SED.name
     threshold: Annotated[float, Meaning("", f"that units fire from below 1 %: {_EDIN_2004}")] = _ENERGY[0]
     exponent: Annotated[
@@ -69,18 +69,18 @@ PARAMETERS = meanings(AfferentSettings)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Firing:
-    """What the afferent does in one trial."""
+    """Firing of the afferent in one trial."""
 
     trial: int | None
     time: Array  # (m,) [s]
     rate: Array  # (m,) [imp/s]
-    settled_rate: float  # long after: background + (static - adaptation) x, within its bounds [imp/s]
+    settled_rate: float  # at long times: background + (static - adaptation) x, within its bounds [imp/s]
     spikes: Array  # (k,) [s]
-    peak_interval: Ends | None = None  # of the greatest rate, that the SED's interval makes; None without it
-    settled_interval: Ends | None = None  # likewise of the settled rate [imp/s]
+    peak_interval: Ends | None = None  # of the greatest rate, from the SED's interval; None without it
+    settled_interval: Ends | None = None  # of the settled rate [imp/s]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data, the rate every 10 ms."""
+        """Return the firing as plain data, with the rate every 10 ms."""
         return {
             "trial": self.trial,
             "settled_rate": self.settled_rate,
@@ -94,9 +94,9 @@ class Firing:
 
 
 def firing_rate(time: Array, size: Array, reference: float, settings: AfferentSettings) -> tuple[Array, Array]:
-    """Return instants (k,) [s] every millisecond and the rate (k,) [imp/s] there, from sizes (m,) at `time` (m,).
+    """Return instants (k,) [s] every millisecond and the rates (k,) [imp/s], from sizes (m,) at `time` (m,).
 
-    The quantity's size goes straight between its instants; before the first nothing is adapted. At `reference` x is 1.
+    The size is interpolated linearly; there is no adaptation before the first instant. At `reference` x is 1.
     """
     grid = np.arange(float(time[0]), float(time[-1]) + _STEP / 2, _STEP)
     x = _drive(np.interp(grid, time, size), reference, settings)
@@ -116,7 +116,7 @@ def _drive(size: Array, reference: float, settings: AfferentSettings) -> Array:
 
 
 def spike_times(time: Array, rate: Array, draw: np.random.Generator, settings: AfferentSettings) -> Array:
-    """Return when a perfect integrator of the rate passes thresholds drawn from a gamma distribution of mean 1 [s].
+    """Return spike times [s] of a perfect integrator of the rate with thresholds from a gamma distribution of mean 1.
 
     Its shape is 1 / variation^2, so that a steady rate gives intervals of that coefficient of variation.
     """
@@ -134,9 +134,9 @@ def spike_times(time: Array, rate: Array, draw: np.random.Generator, settings: A
 def session_firing(
     prediction: SessionPrediction, settings: AfferentSettings | None = None
 ) -> tuple[float | None, tuple[Firing, ...]]:
-    """Return the reference, the median size over all trials, and the firing in each trial whose course is known.
+    """Return the reference, the median size over all trials, and the firing in each trial with a known time course.
 
-    Where tissues relax, courses are known of the SED alone: another quantity makes no firing there.
+    Where tissues relax, only the SED has a time course: other quantities give no firing.
     """
     settings = settings or AfferentSettings()
     values = (_settled_response(row, settings.quantity) for row in prediction.trials)
@@ -155,10 +155,10 @@ def session_firing(
         time, rate = firing_rate(row.history.time, course, reference, settings)
         spikes = spike_times(time, rate, np.random.default_rng([settings.seed, number]), settings)
         peak = settled_ends = None
-        friction = row.interval if settings.quantity == SED.name else None  # the SED alone has one
+        friction = row.interval if settings.quantity == SED.name else None  # only the SED has an interval
         if friction is not None and friction.low is not None and friction.high is not None:
             bounds = friction.low, friction.high
-            # The whole course moves with its end: friction is what is uncertain, and presses nothing.
+            # The whole course scales with its end: only friction is uncertain, not the press.
             peaks = [firing_rate(row.history.time, bound / value * course, reference, settings)[1] for bound in bounds]
             peak = float(peaks[0].max()), float(peaks[1].max())
             settled_ends = _settled_rate(bounds[0], reference, settings), _settled_rate(bounds[1], reference, settings)
@@ -168,7 +168,7 @@ def session_firing(
 
 
 def _settled_response(row: TrialPrediction, quantity: str) -> float | None:
-    """Return a quantity at the ending in the settled state; None where there is none."""
+    """Return a quantity at the ending in the settled state; None without one."""
     if quantity == SED.name:
         return row.sed
     return row.responses[quantity][0] if quantity in row.responses else None
@@ -181,13 +181,13 @@ def _settled_rate(value: float, reference: float, settings: AfferentSettings) ->
 
 
 def firing_document(prediction: SessionPrediction, settings: AfferentSettings) -> dict[str, Any]:
-    """Return the firing in each trial as plain data, with what it is and every parameter."""
+    """Return the firing in each trial as plain data, with a caveat and every parameter."""
     reference, firings = session_firing(prediction, settings)
     return {
         "about": ABOUT.format(label=BY_NAME[settings.quantity].label),
         "quantity": settings.quantity,
         "reference": reference,
-        "reference_sed": reference if settings.quantity == SED.name else None,  # its name before; for one release
+        "reference_sed": reference if settings.quantity == SED.name else None,  # its former name, for one release
         "settings": asdict(settings),
         "parameters": parameters(settings, reference),
         "trials": [firing.to_dict() for firing in firings],
@@ -195,9 +195,9 @@ def firing_document(prediction: SessionPrediction, settings: AfferentSettings) -
 
 
 def parameters(settings: AfferentSettings, reference: float | None = None) -> list[dict[str, Any]]:
-    """Return every parameter with its value, unit, standing ("assumed", or "set" by somebody) and what it rests on.
+    """Return every parameter with its value, unit, standing ("assumed", or "set" by somebody) and basis.
 
-    `reference` is kept with them where it is given, in the unit of the quantity.
+    `reference`, if given, is included, in the unit of the quantity.
     """
     rows: list[dict[str, Any]] = []
     quantity, usual = BY_NAME[settings.quantity], usual_settings(settings.quantity)
@@ -214,14 +214,14 @@ def parameters(settings: AfferentSettings, reference: float | None = None) -> li
 
 
 def usual_settings(quantity: str = SED.name) -> AfferentSettings:
-    """Return what is assumed of an afferent that answers to a quantity of `QUANTITIES`, by its name."""
+    """Return the assumed settings of an afferent driven by a quantity, by its name in `QUANTITIES`."""
     return AfferentSettings(quantity=quantity, threshold=_THRESHOLDS[quantity][0])
 
 
 def settings_with(changes: Mapping[str, float], seed: int = 0, quantity: str = SED.name) -> AfferentSettings:
-    """Return settings with some parameters set by somebody.
+    """Return settings with some parameters changed.
 
-    Raises ValueError, with a sentence, for a name that is none and a value that means nothing.
+    Raises ValueError, with a sentence, for an unknown name and a value out of range.
 
     >>> settings_with({"static_gain": 30.0}).static_gain
     30.0

@@ -1,9 +1,9 @@
-"""The stiffness of a subject's own finger from presses, whose force and depth were recorded: a posterior.
+"""Posterior of the stiffness of a subject's own finger, from presses with recorded force and depth.
 
 Each layer's log stiffness has a normal prior about the published one; noise of the force is Gaussian of unknown size
-(Jeffreys' prior). Where the stage touches the skin is not known either, for each press. Given the two contrasts
-between the layers, the rest is almost linear and integrated in closed form (Laplace; Student's t for unknown noise:
-Gelman et al. 2013, Bayesian Data Analysis, sections 3.2 and 14.2). What is left has two dimensions, and a grid does it.
+(Jeffreys' prior). The touch of the stage is unknown too, for each press. Given the two contrasts between layers, the
+rest is almost linear and integrated in closed form (Laplace; Student's t for unknown noise: Gelman et al. 2013,
+Bayesian Data Analysis, sections 3.2 and 14.2). The two remaining dimensions are integrated on a grid.
 """
 
 from collections.abc import Sequence
@@ -20,31 +20,31 @@ from drivers.arrays import Array
 from sessions.prediction.press_model import CONTRASTS, LAYERS, REACH, FitError, PressModel, at_depths
 from solver import Scene
 
-_POINTS = 16  # of one press, each the mean over as much of its travel: noise of single readings is no model's error
+_POINTS = 16  # of one press, means over equal parts of its travel: noise of single readings is no error of the model
 CHI_SQUARED = 3.841  # 95 % of chi squared with one degree of freedom
-# Halving and doubling these moved ends of intervals by so much of their width, over twelve simulated fingers.
+# The shares are shifts of interval ends by halving and doubling, relative to the width, over twelve simulated fingers.
 _DRAWS = 20_000  # of the posterior: 0.2 % in the median
-_FEWEST = 6  # points of depth and force beyond the numbers that are looked for; fewer hardly estimate the noise
+_FEWEST = 6  # points of depth and force beyond the unknowns; fewer hardly estimate the noise
 _GRID = 25  # contrasts along each axis: 0.5 % with 49, 2 % with 13 in the median
 _ROUNDS, SETTLED = 12, 1e-5  # of the search for touches: 0.2 % at most; it ends when sums of squares fall by less
-_FINE = 200.0  # nodes that carry the posterior (inverse Simpson index), else the grid is drawn closer: not at all
-CLOSER = 4  # grids at most
+_FINE = 200.0  # nodes that carry the posterior (inverse Simpson index), else the grid is refined: no shift
+CLOSER = 4  # most refinements of a grid
 QUANTILES = (0.025, 0.975)
-NARROW = 0.8  # of the prior's width: a narrower interval says that presses inform about a layer
+NARROW = 0.8  # of the prior's width: a narrower interval shows that presses inform about a layer
 
 
 class LoadingCurve(NamedTuple):
-    """One press as it is loaded: n points."""
+    """The loading part of one press: n points."""
 
     displacement: Array  # (n,) of the stage or bone, positive into the finger [mm]
     force: Array  # (n,) normal [N]
     touch: float  # displacement at which the force leaves its zero [mm]
-    width: Array  # (n,) length of the contact along the finger [mm]; nan where it was not measured
-    readings: int = 0  # that the points are means of
+    width: Array  # (n,) length of the contact along the finger [mm]; nan where not measured
+    readings: int = 0  # behind the points
 
     @staticmethod
     def of(displacement: Array, force: Array, width: Array) -> "LoadingCurve":
-        """Return the means of readings (m,) over as many equal parts of their travel as a curve has points."""
+        """Return means of readings (m,) over equal parts of their travel, one for each point of a curve."""
         edges: Array = np.linspace(float(displacement[0]), float(displacement[-1]), _POINTS + 1)
         part = np.clip(np.searchsorted(edges, displacement, side="right") - 1, 0, _POINTS - 1)
         count = np.bincount(part, minlength=_POINTS)
@@ -64,7 +64,7 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class LayerFit:
-    """What is known of one layer's stiffness [MPa]."""
+    """Estimates of one layer's stiffness [MPa]."""
 
     name: str
     stiffness: Interval  # at the maximum of the posterior, with its 95 % credible interval
@@ -80,36 +80,36 @@ class FingerFit:
 
     scene: Scene  # with the finger at the maximum of the posterior
     layers: tuple[LayerFit, ...]
-    overall: Interval  # force over that of the published stiffnesses, mean of the logs over the depths pressed [-]
-    touch: tuple[float, ...]  # displacement at which each press touches [mm]
+    overall: Interval  # force relative to that of published stiffnesses, geometric mean over the depths pressed [-]
+    touch: tuple[float, ...]  # displacement at the touch of each press [mm]
     noise: float  # standard deviation of the points' forces [N]
-    widths: int  # points with a length of contact
+    widths: int  # points with a measured contact length
     points: int
     deepest: float  # [mm]
     draws: Array  # (m, 3) of the posterior of the stiffnesses [MPa]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data, without draws."""
+        """Return the fit as plain data, without draws."""
         names = ("layers", "overall", "touch", "noise", "points", "widths", "deepest")
         return {name: msgspec.to_builtins(getattr(self, name)) for name in names}
 
 
 class _Grid(NamedTuple):
-    """What the data say at contrasts; g of them."""
+    """Fits at g contrasts."""
 
     contrast: Array  # (g, 2) in deviations of the prior
-    mean: Array  # (g,) mean log factor of the stiffnesses that fits best
+    mean: Array  # (g,) best mean log factor of the stiffnesses
     touch: Array  # (g, presses) [mm]
     misfit: Array  # (g,) of the forces, sum of squares [N2]
-    variance: Array  # (g,) of the mean by the noise's variance [1/N2]
+    variance: Array  # (g,) of the mean, relative to the noise's variance [1/N2]
     fits: Array  # (g,) log likelihood
-    weight: Array  # (g,) of the posterior, their sum 1
+    weight: Array  # (g,) of the posterior, with sum 1
     likelihood: Array  # (g,) the same without the prior
     step: float  # greatest distance between neighbours, in deviations
 
 
 class Likelihood:
-    """What presses say of a finger, by a model of them."""
+    """Likelihood of a finger given presses and a model of them."""
 
     def __init__(self, model: PressModel, presses: Sequence[LoadingCurve]) -> None:
         """Raise FitError where presses are too few."""
@@ -124,7 +124,7 @@ class Likelihood:
             raise FitError(
                 f"{len(self.force)} points of {len(presses)} presses are too few: press deeper, slower, or more often."
             )
-        # What the model itself is off by is no smaller where the noise is.
+        # The model's own error does not shrink with the noise.
         self.floor = len(self.force) * float(np.mean((model.error * self.force) ** 2))
         self.wide = np.flatnonzero(np.isfinite(width))
         self.width = width[self.wide]
@@ -133,13 +133,13 @@ class Likelihood:
         self.width_floor = float(np.sum((width_error * self.width) ** 2))
 
     def grid(self, contrast: Array, step: float, start: Array) -> _Grid:
-        """Return the best mean and touch at contrasts (g, 2) that lie a `step` apart, from touches (presses,) [mm]."""
+        """Return best means and touches at contrasts (g, 2), `step` apart, from touches `start` (presses,) [mm]."""
         forces = self.model.log_force(contrast) + np.log(self.model.scene.finger.width)
         spline = CubicSpline(np.log(self.model.depth), forces, axis=1)
         touch = np.tile(start, (len(contrast), 1))
         mean, misfit, residual, jacobian = self._linear(spline, touch)
         damping = np.full(len(contrast), 1e-3)
-        for _ in range(_ROUNDS):  # Levenberg and Marquardt, all contrasts at once
+        for _ in range(_ROUNDS):  # Levenberg-Marquardt for all contrasts together
             trial_touch = touch + _steps(jacobian, residual, damping)[:, 1:]
             trial = self._linear(spline, trial_touch)
             better = trial[1] < misfit
@@ -166,7 +166,7 @@ class Likelihood:
         return np.log(factor), (residual**2).sum(axis=1), residual, np.dstack([force, touch_slope])
 
     def _width_deviance(self, contrast: Array, touch: Array) -> Array:
-        """Return minus twice the log likelihood (g,) of the contacts' lengths, 0 where there are none."""
+        """Return minus twice the log likelihood (g,) of the contacts' lengths, 0 without any."""
         if not len(self.wide):
             return np.zeros(len(contrast))
         spline = CubicSpline(np.log(self.model.depth), self.model.log_width(contrast), axis=1)
@@ -186,7 +186,7 @@ class Likelihood:
         knots, width = np.log(self.model.depth), np.log(self.model.scene.finger.width)
 
         def residual(numbers: Array) -> Array:
-            """Return residuals of forces, contacts and prior, each by its standard deviation."""
+            """Return residuals of forces, contacts and prior, each over its standard deviation."""
             depth, contrast = self.displacement - numbers[3:][self.press], numbers[None, :2]
             logs = (
                 (self.model.log_force(contrast) + width + numbers[2], depth),
@@ -200,7 +200,7 @@ class Likelihood:
         return optimum[:2], optimum[3:], float(optimum[2])
 
     def profile(self, grids: Sequence[_Grid], layer: int) -> Interval:
-        """Return a layer's log factor of greatest likelihood with the 95 % interval of its profile, 0 as published."""
+        """Return a layer's maximum-likelihood log factor (0: published) with the 95 % interval of its profile."""
         contrast, mean, misfit, variance, fits = (
             np.concatenate([getattr(grid, name) for grid in grids]) for name in _Grid._fields[:6] if name != "touch"
         )
@@ -217,9 +217,9 @@ class Likelihood:
 
 
 def fit(model: PressModel, presses: Sequence[LoadingCurve], gain_error: float = 0.0, seed: int = 0) -> FingerFit:
-    """Return the posterior of the stiffnesses of a finger, given presses.
+    """Return the posterior of a finger's stiffnesses, given presses.
 
-    `gain_error` is the force's standard uncertainty [-], `seed` that of draws. Raises FitError for too few points.
+    `gain_error` is the force's standard uncertainty [-], `seed` the seed of draws. Raises FitError for too few points.
     """
     likelihood = Likelihood(model, presses)
     touches = np.array([press.touch for press in presses])
@@ -254,7 +254,7 @@ def fit(model: PressModel, presses: Sequence[LoadingCurve], gain_error: float = 
 
 
 def _layer(likelihood: Likelihood, grids: Sequence[_Grid], number: int, best: Array, draws: Array) -> LayerFit:
-    """Return what is known of one layer, and say it in a sentence."""
+    """Return the estimates of one layer, with a sentence."""
     name, spread = LAYERS[number], likelihood.model.spread
     published = likelihood.model.scene.materials.of(name).E
     low, high = np.quantile(draws[:, number], QUANTILES).tolist()
@@ -274,7 +274,7 @@ def _layer(likelihood: Likelihood, grids: Sequence[_Grid], number: int, best: Ar
 
 
 def _nodes(centre: Array, axes: Array) -> tuple[Array, float]:
-    """Return contrasts (g, 2) of a grid within the model's reach, and their step; `axes` (2, 2) are its half widths."""
+    """Return the contrasts (g, 2) of a grid within the model's reach, and their step; `axes` (2, 2) are half widths."""
     line: Array = np.linspace(-1.0, 1.0, _GRID)
     nodes = centre + np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2) @ axes
     step = float(np.hypot(*axes.T).max()) * 2.0 / (_GRID - 1)
@@ -282,7 +282,7 @@ def _nodes(centre: Array, axes: Array) -> tuple[Array, float]:
 
 
 def _closer(likelihood: Likelihood, grid: _Grid, name: str) -> _Grid:
-    """Return a grid along the main axes of what carries the weights of a `name`, drawn closer until enough do."""
+    """Return a grid along the principal axes of the weights `name`, refined until enough nodes carry weight."""
     for _ in range(CLOSER):
         weight: Array = getattr(grid, name)
         if 1.0 / float((weight**2).sum()) >= _FINE:
@@ -300,7 +300,7 @@ def _closer(likelihood: Likelihood, grid: _Grid, name: str) -> _Grid:
 
 
 def _steps(jacobian: Array, residual: Array, damping: Array) -> Array:
-    """Return the damped steps (g, p) that lessen residuals (g, n), each number on its own scale."""
+    """Return the damped steps (g, p) that reduce residuals (g, n), each parameter on its own scale."""
     transposed = np.swapaxes(jacobian, 1, 2)
     normal = transposed @ jacobian
     diagonal = np.einsum("gii->gi", normal)

@@ -1,4 +1,4 @@
-"""What a user may ask of the model: quantity, finger, strain, readings; and the scene file that describes a finger."""
+"""Options of a prediction: finger, depth, course, strain and variants; and the scene file that describes a finger."""
 
 import tomllib
 from collections.abc import Mapping
@@ -19,21 +19,21 @@ BY_NAME: Mapping[str, Quantity] = {quantity.name: quantity for quantity in QUANT
 
 @dataclass(frozen=True, slots=True)
 class PredictionOptions:
-    """What a user may ask of the model."""
+    """A user's options of a prediction."""
 
-    tau_reading: TauReading = "computed"  # "as-printed": a hundredth of it, as the paper's tables are headed
-    scene: Scene | None = None  # whose finger, width, materials, receptor and tolerance to take; None: the published
+    tau_reading: TauReading = "computed"  # "as-printed": a hundredth of it, as headed in the paper's tables
+    scene: Scene | None = None  # source of finger, width, materials, receptor and tolerance; None: the published one
     indentation: float | None = None  # [mm], instead of each block's own
     course: Literal["steady", "history"] = "history"
     kinematics: Literal["small", "finite"] = "small"
-    # Also what the uncertainty of friction makes of each SED, and the trials otherwise: see `prediction.uncertainty`
+    # Intervals of each SED from the uncertainty of friction, and variants: see `prediction.uncertainty`
     intervals: bool = False
-    variant_intervals: bool = False  # those of the variants at finite strain too, which takes longer
+    variant_intervals: bool = False  # also for variants at finite strain, which takes longer
     variants: Literal["none", "small", "both"] = "none"  # at which strain
 
 
 def with_own_finger(options: PredictionOptions, plan: SessionPlan) -> PredictionOptions:
-    """Return the options with the subject's own finger, as far as the plan knows it and no other was asked for."""
+    """Return the options with the subject's own finger, as far as the plan has it, unless they name another."""
     if options.scene is not None:
         return options
     published = template(options)
@@ -48,30 +48,30 @@ def with_own_finger(options: PredictionOptions, plan: SessionPlan) -> Prediction
 
 
 def template(options: PredictionOptions) -> Scene:
-    """Return the scene whose finger is predicted; its friction and loading are put in for each trial."""
+    """Return the scene with the finger; friction and loading are replaced for each trial."""
     return options.scene or Scene(friction=Friction(0.0), loading=Loading(1.0))
 
 
 def tau_scale(options: PredictionOptions) -> float:
-    """Return what tau_max as measured is multiplied by in the reading asked for."""
+    """Return the factor of the measured tau_max in the chosen reading."""
     return BOUND_SCALE[options.tau_reading] / BOUND_SCALE["computed"]
 
 
 def bound(tau_max: float | None, options: PredictionOptions) -> float | None:
-    """Return the traction bound [MPa] in the reading asked for."""
+    """Return the traction bound [MPa] in the chosen reading."""
     return None if tau_max is None else tau_max * tau_scale(options)
 
 
-# Every scene has them, and `sessions.prediction.scenes` puts those of the trials in their place.
+# Placeholders that every scene needs; `sessions.prediction.scenes` replaces them by those of the trials.
 _OF_TRIALS: Mapping[str, Mapping[str, Any]] = {"friction": {"mu": 0.0}, "loading": {"indentation": 1.0}}
 _OF_OPTIONS = ("kinematics", "course", "evidence")
 
 
 def finger_in(path: Path) -> tuple[Scene, str]:
-    """Return the scene whose finger, materials, receptor and tolerance a file gives, and what of it is not taken.
+    """Return the scene with a file's finger, materials, receptor and tolerance, and a sentence on ignored keys.
 
-    The file may lack friction and loading. "" where all that it holds is taken. Raises FileNotFoundError, and
-    SettingsError for anything wrong in what is taken, or where nothing is.
+    The file may lack friction and loading. The sentence is "" where no key is ignored. Raises FileNotFoundError, and
+    SettingsError for an error in the used part, or where nothing is used.
     """
     text = text_of(path)
     scene = from_toml(text, Scene, str(path), instead=_OF_TRIALS)

@@ -1,4 +1,4 @@
-"""Presses of a recording as force over displacement: what a finger's stiffness is fitted to."""
+"""Presses of a recording as force over displacement, for fits of a finger's stiffness."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,29 +13,29 @@ from sessions.strokes import AnalysisSettings, StrokeCurve
 from sessions.strokes.analysis import analyse_blocks
 from sessions.strokes.trial_analysis import TrialContext
 
-LONGEST_GAP = 0.1  # of the log within a press [s]: meanwhile a finger travels less than a point's share
-STANDS = 0.01  # distance from its greatest travel, by that, within which a stage stands [-]
-SHORTEST_HOLD = 0.5  # least time for which it stands: the shortest press of the analysis [s]
-LEAST_TRAVEL = 0.1  # least travel of a press; with less, the log is not that of the bone [mm]
+LONGEST_GAP = 0.1  # of the log within a press [s]: a finger then moves less than one point's share
+STANDS = 0.01  # distance from the greatest travel, relative to it, within which a stage is at rest [-]
+SHORTEST_HOLD = 0.5  # least time at rest: the shortest press of the analysis [s]
+LEAST_TRAVEL = 0.1  # least travel of a press; with less, the log is not of the bone [mm]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DisplacementLog:
-    """Where the bone or the stage stood; n rows in order of time."""
+    """Positions of the bone or the stage; n rows in order of time."""
 
-    clock: str  # what `instants` counts: "time_s" [s], "received_ns" [ns] or "sequence" of the readings
-    instants: Array  # (n,) growing
-    displacement: Array  # (n,) positive into the finger, from anywhere [mm]
-    width: Array  # (n,) of the contact along the finger [mm]; nan where it was not measured
+    clock: str  # the clock of `instants`: "time_s" [s], "received_ns" [ns] or "sequence" of the readings
+    instants: Array  # (n,) increasing
+    displacement: Array  # (n,) positive into the finger, from any origin [mm]
+    width: Array  # (n,) of the contact along the finger [mm]; nan where not measured
 
 
 @dataclass(frozen=True, slots=True)
 class PressCurves:
-    """The presses that a log follows, and why others are left out."""
+    """The presses covered by a log, and reasons for omitting others."""
 
     presses: tuple[LoadingCurve, ...]
     names: tuple[str, ...]  # of each press, for people
-    holds: tuple[HoldCurve | None, ...]  # each press to the end of its hold; None where its stage does not stand
+    holds: tuple[HoldCurve | None, ...]  # each press to the end of its hold; None where the stage is not at rest
     left_out: tuple[str, ...]  # a sentence each
 
 
@@ -78,7 +78,7 @@ def press_curves(recording: Recording, log: DisplacementLog, settings: AnalysisS
 
 
 def _loading(curve: StrokeCurve, onset: float, times: Array, displacement: Array, width: Array) -> LoadingCurve | str:
-    """Return the loading of a press whose log has its rows at `times` (n,) [s]; or why there is none."""
+    """Return the loading of a press from a log with rows at `times` (n,) [s]; or why there is none."""
     peak_time = float(curve.time[int(np.nanargmax(curve.normal))])
     inside = np.flatnonzero((times >= onset) & (times <= peak_time))
     if not len(times) or times[0] > onset or times[-1] < peak_time:
@@ -89,7 +89,7 @@ def _loading(curve: StrokeCurve, onset: float, times: Array, displacement: Array
     loading = (curve.time >= onset) & (curve.time <= peak_time) & np.isfinite(curve.normal)
     travel = np.interp(curve.time[loading], times, displacement)
     force = curve.normal[loading]
-    # A stage that stands while the finger relaxes adds nothing but time: it ends where it has arrived.
+    # Relaxation while the stage is at rest is no loading: the loading ends on arrival.
     count = int(np.argmax(travel >= travel.max() - 1e-3 * np.ptp(travel))) + 1
     travel, force = travel[:count], force[:count]
     if travel[-1] - travel[0] < LEAST_TRAVEL:
@@ -97,12 +97,12 @@ def _loading(curve: StrokeCurve, onset: float, times: Array, displacement: Array
             f"the log moves by {travel[-1] - travel[0]:.2g} mm while the force grows, and less than {LEAST_TRAVEL:g} "
             "mm is no press: displacement must be positive into the finger, on the session's clock"
         )
-    lengths = np.interp(curve.time[loading][:count], times, width)  # nan next to every row that has none
+    lengths = np.interp(curve.time[loading][:count], times, width)  # nan next to every row without one
     return LoadingCurve.of(travel, force, lengths)
 
 
 def _hold(curve: StrokeCurve, onset: float, times: Array, displacement: Array) -> HoldCurve | None:
-    """Return the readings of a press to the end of its hold; None where the stage stands too briefly."""
+    """Return the readings of a press to the end of its hold; None where the stage is at rest too briefly."""
     inside = (curve.time >= onset) & (curve.time <= times[-1]) & np.isfinite(curve.normal)
     time, force = curve.time[inside], curve.normal[inside]
     travel = np.interp(time, times, displacement)

@@ -1,7 +1,7 @@
-"""The model's force of a press for any stiffnesses of the layers, from few solves.
+"""The model's force of a press for any layer stiffnesses, interpolated between few solves.
 
-At small strain N is linear in all stiffnesses together, so only two contrasts between the three layers are left, and
-the depth. Over them log N is a polynomial through solved forces and their exact derivatives by each stiffness.
+At small strain N is linear in a common factor of all stiffnesses, so only depth and two contrasts between the three
+layers remain. Over these log N is a polynomial through solved forces and their exact derivatives by each stiffness.
 """
 
 from collections.abc import Sequence
@@ -21,16 +21,16 @@ from solver.response.nearby import stiffness_shares
 LAYERS = ("epidermis", "dermis", "fat")  # the bone is rigid
 # Orthonormal contrasts of three log stiffnesses: skin's two layers, and both against the fat.
 CONTRASTS = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, -2.0]]) / np.sqrt([[2.0], [6.0]])
-REACH = 3.3  # largest contrast in deviations of the prior: 0.4 % of a two-dimensional normal law lies beyond
+REACH = 3.3  # largest contrast in deviations of the prior: 0.4 % of a two-dimensional normal law is beyond
 DEGREE = 7  # of the polynomial; 6 misses solved forces by twice as much, 8 by as much as 7
-RINGS = (1, 5, 8, 12)  # contrasts solved on circles: 26 forces and 52 slopes for the 36 numbers of degree 7
-DEGREE_OF_WIDTH = 4  # of the contact's length, whose derivatives are not known: 15 numbers
-DEGREE_OF_FRICTION = 2  # of what friction adds to log N, 2 to 13 % over contrasts and depths
-RINGS_OF_FRICTION = (1, 4, 5)  # 10 forces for the 6 numbers of degree 2
-DEPTHS = 9  # at which presses are solved; between them log N follows log depth as a cubic spline
+RINGS = (1, 5, 8, 12)  # contrasts solved on circles: 26 forces and 52 slopes for the 36 coefficients of degree 7
+DEGREE_OF_WIDTH = 4  # of the contact's length, whose derivatives are unknown: 15 coefficients
+DEGREE_OF_FRICTION = 2  # of the friction's contribution to log N, 2 to 13 % over contrasts and depths
+RINGS_OF_FRICTION = (1, 4, 5)  # 10 forces for the 6 coefficients of degree 2
+DEPTHS = 9  # solved depths of a press; between them log N is a cubic spline of log depth
 CHECK_DEPTHS = 4  # depths at which a fitted finger is solved
-SHALLOWEST = 0.05  # of the deepest: a contact of few elements is not worth more
-_TOLERANCE = 0.0005  # of the SED: forces are off by 0.04 %; at 0.1 % intervals of a simulated finger hold it too rarely
+SHALLOWEST = 0.05  # relative to the deepest: shallower contacts have too few elements
+_TOLERANCE = 0.0005  # of the SED: forces err by 0.04 %; at 0.1 % intervals contain a simulated finger too rarely
 
 
 class FitError(Exception):
@@ -41,25 +41,25 @@ class FitError(Exception):
 class PressModel:
     """log N over depth and stiffness contrasts; k depths."""
 
-    scene: Scene  # whose finger and stiffnesses the contrasts are counted from
-    spread: float  # of the prior of each log stiffness, its standard deviation [-]
+    scene: Scene  # with the finger and the reference stiffnesses of the contrasts
+    spread: float  # standard deviation of the prior of each log stiffness [-]
     depth: Array  # (k,) [mm]
     coefficients: Array  # (c, k) of log N [N/mm]
     width: Array  # (w, k) of the log of the contact's length along the finger [mm]
     mu: float  # friction of the surface that is pressed [-]
-    error: float  # of the solved forces as the solver estimates it, and of the polynomial between them, relative [-]
-    width_error: Array  # (k,) likewise of the contact, which is coarse where it is short [-]
+    error: float  # relative error of solved forces, by the solver's estimate, and of the polynomial [-]
+    width_error: Array  # (k,) the same for the contact's length, coarse where it is short [-]
 
     def log_force(self, contrast: Array) -> Array:
-        """Return log N (g, k) [N/mm] for `contrast` (g, 2) in deviations of the prior, the mean log stiffness kept."""
+        """Return log N (g, k) [N/mm] for `contrast` (g, 2) in deviations of the prior, at the reference stiffness."""
         return _basis(contrast, DEGREE)[0] @ self.coefficients
 
     def log_width(self, contrast: Array) -> Array:
-        """Return the log of the contact's length (g, k) [mm]; the mean log stiffness does not matter."""
+        """Return the log of the contact's length (g, k) [mm]; independent of the mean log stiffness."""
         return _basis(contrast, DEGREE_OF_WIDTH)[0] @ self.width
 
     def force(self, stiffness: Array, depth: Array) -> Array:
-        """Return N (n,) [N] of the whole finger with layers of a `stiffness` (3,) [MPa] at depths (n,) [mm]."""
+        """Return N (n,) [N] of the whole finger with layer stiffnesses (3,) [MPa] at depths (n,) [mm]."""
         mean, contrast = self.contrasts(stiffness)
         log = self.log_force(contrast[None]) + mean + np.log(self.scene.finger.width)
         return at_depths(CubicSpline(np.log(self.depth), log, axis=1), depth[None])[0][0]
@@ -75,7 +75,7 @@ class PressModel:
         return np.array(reference) * np.exp(mean[:, None] + self.spread * contrast @ CONTRASTS)
 
     def finger(self, stiffness: Array) -> Scene:
-        """Return the scene with layers of a `stiffness` (3,) [MPa], that at the speed of the presses: none relaxes."""
+        """Return the scene with layer stiffnesses (3,) [MPa] at the presses' speed, without relaxation."""
         materials, moduli = self.scene.materials, zip(LAYERS, stiffness.tolist(), strict=True)
         layers = {name: replace(materials.of(name), E=modulus, prony=()) for name, modulus in moduli}
         return replace(self.scene, materials=replace(materials, **layers))
@@ -84,9 +84,9 @@ class PressModel:
 def press_model(
     scene: Scene, spread: float, deepest: float, mu: float = 0.0, progress: Progress | None = None
 ) -> PressModel:
-    """Return the model of presses up to a depth [mm] of the finger of a scene, on a surface of friction `mu`.
+    """Return the model of presses up to a depth [mm] of a scene's finger, on a surface of friction `mu`.
 
-    `spread` is the prior's standard deviation of each log stiffness. Raises FitError without a state, and Cancelled.
+    `spread` is the prior's standard deviation of each log stiffness. Raises FitError without a solution, and Cancelled.
     """
     depth = np.geomspace(SHALLOWEST * deepest, deepest, DEPTHS)
     contrast = _design(RINGS)
@@ -127,14 +127,14 @@ def press_model(
 
 
 class Check(NamedTuple):
-    """What the solver itself says of a finger that was fitted."""
+    """Comparison of a fitted finger with direct solves."""
 
-    deviation: float  # the fitted model's forces differ from the solver's own by, at most [-]
+    deviation: float  # largest relative difference of fitted and solved forces [-]
     shares: Array  # (3,) d log N / d log E of each layer at the deepest press, without friction [-]
 
 
 def check(model: PressModel, stiffness: Array, deepest: float) -> Check:
-    """Solve presses to a depth [mm] with layers of a `stiffness` (3,) [MPa] and compare forces. Raises FitError."""
+    """Solve presses to a depth [mm] with layer stiffnesses (3,) [MPa] and compare forces. Raises FitError."""
     finger = model.finger(stiffness)
     mean, contrast = model.contrasts(stiffness)
     upto = np.flatnonzero(model.depth <= deepest)[-CHECK_DEPTHS:]
@@ -149,9 +149,9 @@ def check(model: PressModel, stiffness: Array, deepest: float) -> Check:
 def at_depths(spline: CubicSpline, depth: Array) -> tuple[Array, Array]:
     """Return exp of a spline (g) of log depth at depths (g, n) [mm], and its derivative by depth.
 
-    Beyond its knots the logarithm goes on straight: a power law.
+    Beyond its knots the logarithm is extrapolated linearly: a power law.
     """
-    depth = np.maximum(depth, 1e-9)  # above the skin nothing presses
+    depth = np.maximum(depth, 1e-9)  # above the skin there is no force
     knots, log = spline.x, np.log(depth)
     inside = np.clip(log, knots[0], knots[-1])
     piece = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
@@ -181,7 +181,7 @@ def _solve_presses(finger: Scene, depth: Array, mu: float) -> Sequence[Predictio
 
 
 def _design(rings: Sequence[int]) -> Array:
-    """Return contrasts (g, 2) on rings of so many points, whose radii lie like Chebyshev's, in deviations."""
+    """Return contrasts (g, 2) on rings with these numbers of points, at Chebyshev radii, in deviations."""
     radii = REACH * np.sin(np.linspace(0.0, np.pi / 2.0, len(rings)))
     points = [
         radius * np.array([np.cos(angle), np.sin(angle)])
@@ -197,7 +197,7 @@ def _orders(degree: int) -> Indices:
 
 
 def _fit(basis: Array, values: Array) -> Array:
-    """Return the coefficients with which `basis` fits `values` in the least squares."""
+    """Return the least-squares coefficients of `basis` for `values`."""
     return np.asarray(np.linalg.lstsq(basis, values, rcond=None)[0], np.float64)
 
 

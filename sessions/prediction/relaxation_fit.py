@@ -1,11 +1,11 @@
-"""How the tissues of a finger relax, from presses that are held: part g and time tau of one Prony term.
+"""Relaxation of a finger's tissues from held presses: part g and time tau of one Prony term.
 
-All layers relax alike. The force is then the elastic one for the depth so far, less what has relaxed of it
-(quasi-linear viscoelasticity: Fung 1993, Biomechanics, section 7.6):
+All layers relax equally. The force is then the elastic one for the present depth, less its relaxed part (quasi-linear
+viscoelasticity: Fung 1993, Biomechanics, section 7.6):
 
 N(t) = a [(1 - g) e(t) + g h(t)], dh/dt = de/dt - h / tau,
 
-with e(t) the force of the finger that was fitted, whose size a is found anew, since a press is too slow to be elastic.
+with e(t) the force of the fitted finger, whose scale a is fitted again, since a press is too slow to be elastic.
 """
 
 from collections.abc import Sequence
@@ -21,31 +21,31 @@ from sessions.prediction.press_model import LAYERS, FitError, PressModel
 from solver import Relaxation, Scene
 
 BLOCK = 0.05  # averaging time of the forces compared: about the correlation time of a filter at 20 Hz [s]
-GRID_SIZE = 60  # values of each number in one round, between bounds that narrow from round to round
+GRID_SIZE = 60  # values of each parameter in one round; bounds narrow between rounds
 _ROUNDS = 5  # most rounds
-_FINE = 12.0  # values of each number that carry the posterior at the end (inverse Simpson index)
-TURNS, _AGREED = 8, 0.003  # most alternations of finger and relaxation, and the change of the part that ends them [-]
-LEAST_PART = 0.01  # a part that may be less cannot be distinguished from none [-]
+_FINE = 12.0  # values of each parameter that carry the final posterior (inverse Simpson index)
+TURNS, _AGREED = 8, 0.003  # most alternations of finger and relaxation, and the change of g that ends them [-]
+LEAST_PART = 0.01  # a g that may be smaller is indistinguishable from 0 [-]
 LARGEST_PART = 0.95  # a scene allows 0.99 [-]
-_LONGEST = 10.0  # longest relaxation time tried, by the longest hold; the shortest is a block [-]
-_FEWEST = 10  # fewest blocks beyond the unknown numbers
+_LONGEST = 10.0  # longest relaxation time relative to the longest hold; the shortest is a block [-]
+_FEWEST = 10  # fewest blocks beyond the unknowns
 
 
 class HoldCurve(NamedTuple):
     """One press from its touch to the end of its hold: n readings."""
 
     time: Array  # (n,) [s]
-    displacement: Array  # (n,) as the log has it [mm]
+    displacement: Array  # (n,) from the log [mm]
     force: Array  # (n,) normal [N]
 
     @property
     def fall(self) -> float:
-        """By how much the force falls from its greatest to the end, in means over a block, by the greatest [-]."""
+        """Relative fall of the force from its greatest block mean to the last [-]."""
         force = _means(np.floor((self.time - self.time[0]) / BLOCK).astype(np.int64), self.force)
         return float(1.0 - force[-1] / force.max())
 
     def unrelaxed(self, part: float, tau: float) -> "HoldCurve":
-        """Return the press with the forces that it would have had if nothing had relaxed since its touch."""
+        """Return the press with the forces it would have without relaxation since its touch."""
         forces = np.empty(len(self.force))
         forces[0] = memory = self.force[0]
         for index in range(1, len(forces)):
@@ -59,19 +59,19 @@ class HoldCurve(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class RelaxationFit:
-    """What is known of one Prony term that all layers share."""
+    """Estimates of one Prony term shared by all layers."""
 
     part: Interval  # g [-]
     time: Interval  # tau [s]
-    at_once: float  # stiffness at once by that of the finger fitted as if it were elastic [-]
+    at_once: float  # instantaneous stiffness relative to that of the elastic fit [-]
     sentence: str
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data."""
+        """Return the fit as plain data."""
         return msgspec.to_builtins(self)
 
     def relaxing(self, scene: Scene) -> Scene:
-        """Return `scene` with layers that relax, as stiff at once as found; unchanged where the part may be none."""
+        """Return `scene` with relaxing layers of the fitted instantaneous stiffness; unchanged where g may be 0."""
         if _may_be_none(self.part):
             return scene
         term = (Relaxation(self.part.value, self.time.value),)
@@ -87,11 +87,11 @@ def relaxing_fit(
     gain_error: float = 0.0,
     seed: int = 0,
 ) -> tuple[FingerFit, RelaxationFit]:
-    """Return the stiffnesses at once of a finger that relaxes, and how it does, from presses that are all held.
+    """Return instantaneous stiffnesses and relaxation of a finger, from presses that are all held.
 
-    A press is too slow to be elastic, and what relaxes on its way bends the force over depth. So both are found in
-    turns: the relaxation for the finger, and the finger for forces without the relaxation. Raises
-    FitError where no press is held.
+    A press is too slow to be elastic, and relaxation during loading bends the force over depth. So both are fitted in
+    turns: the relaxation for the finger, and the finger for forces without relaxation. Raises FitError where no press
+    is held.
     """
     finger_fit = fit(model, presses, gain_error, seed)
     rate = relaxation(model, finger_fit, holds)
@@ -110,9 +110,9 @@ def relaxing_fit(
 
 
 def relaxation(model: PressModel, finger_fit: FingerFit, holds: Sequence[HoldCurve]) -> RelaxationFit:
-    """Return how a finger relaxes in presses that are held.
+    """Return the relaxation of a finger in held presses.
 
-    g is equally likely from 0 to 0.95 before, tau equally likely in its logarithm; a and the noise are integrated in
+    The prior is uniform in g from 0 to 0.95 and in the logarithm of tau; a and the noise are integrated in
     closed form, as for the stiffness. Raises FitError where no press is held.
     """
     if not holds:
@@ -145,9 +145,9 @@ def relaxation(model: PressModel, finger_fit: FingerFit, holds: Sequence[HoldCur
 def _posterior(
     holds: Sequence[HoldCurve], elastic: Sequence[Array], parts: Array, times: Array, error: float
 ) -> tuple[Array, Array]:
-    """Return the log posterior (g, t) of parts (g,) and times (t,), and the stiffness at once that fits best (g, t).
+    """Return the log posterior (g, t) of parts (g,) and times (t,), and the best instantaneous stiffness (g, t).
 
-    `elastic` are the forces (n,) of each press without relaxing, which the model knows but for an `error` [-].
+    `elastic` are each press's forces (n,) without relaxation, with a relative `error` of the model [-].
     """
     misfit, spread, size = np.zeros((3, len(parts), len(times)))
     count = 0
@@ -187,13 +187,13 @@ def _means(block: Indices, values: Array) -> Array:
 
 
 def _about(values: Array, weight: Array) -> tuple[float, float]:
-    """Return bounds about the values (n,) that carry a weight."""
+    """Return bounds of the values (n,) with non-negligible weight."""
     carry = np.flatnonzero(weight > 1e-6 * weight.max())
     return float(values[max(carry[0] - 1, 0)]), float(values[min(carry[-1] + 1, len(values) - 1)])
 
 
 def _interval(values: Array, weight: Array) -> tuple[float, float]:
-    """Return the ends of a 95 % interval of values (n,) of a weight."""
+    """Return the ends of the 95 % interval of weighted values (n,)."""
     sums = np.cumsum(weight) / weight.sum()
     low, high = (float(values[int(np.searchsorted(sums, share))]) for share in QUANTILES)
     return low, high

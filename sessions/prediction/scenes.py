@@ -1,4 +1,4 @@
-"""From strokes to scenes, and to the prediction of a session: what the model gets of each trial and of its variants.
+"""From strokes to scenes, and to the prediction of a session: the model's input for each trial and its variants.
 
 All scenes of a session are solved together on one mesh, so that differences are accurate.
 """
@@ -27,15 +27,15 @@ from solver.response.nearby import Gradient, Nearby, nearby
 from solver.scene.published import BOUND_SCALE
 
 SLIDES: dict[int, Slide] = {PROXIMAL_TO_DISTAL: "+x", DISTAL_TO_PROXIMAL: "-x"}
-CONTRAST = 0.05  # error of differences between surfaces, by their range: far below what scores distinguish
-DEFAULT_SPEED = 20.0  # where none was measured [mm/s]; rescales the time of a course and nothing else
+CONTRAST = 0.05  # error of differences between surfaces, relative to their range: far below the resolution of scores
+DEFAULT_SPEED = 20.0  # where none was measured [mm/s]; rescales only the time of a course
 
 
 class ModelInput(NamedTuple):
     """The row and the scene of one trial or stroke, before it is solved."""
 
-    row: TrialPrediction  # as far as it is known before solving
-    scene: Scene | None  # None where there is nothing to solve
+    row: TrialPrediction  # as known before solving
+    scene: Scene | None  # None without a scene to solve
 
 
 def scenes_of(analysis: Analysis, plan: SessionPlan, options: PredictionOptions) -> Mapping[int, Scene]:
@@ -45,7 +45,7 @@ def scenes_of(analysis: Analysis, plan: SessionPlan, options: PredictionOptions)
 
 
 def model_inputs(analysis: Analysis, plan: SessionPlan, options: PredictionOptions) -> Iterator[ModelInput]:
-    """Yield the model's input for every planned trial, or for every stroke where there is no plan."""
+    """Yield the model's input for every planned trial, or for every stroke without a plan."""
     if not plan.blocks:
         by_stroke = {friction.stroke: friction for friction in analysis.friction}
         for number in range(len(analysis.strokes)):
@@ -70,7 +70,7 @@ def _model_input(
     trial: Trial | None = None,
     block: Block | None = None,
 ) -> ModelInput:
-    """Return the model's input for the stroke of that number, with the reason for every number that is missing."""
+    """Return the model's input for stroke `number`, with the reason for every missing result."""
     stroke = None if number is None else analysis.strokes[number]
     direction = friction.direction if friction is not None else None
     if direction is None and trial is not None:
@@ -98,7 +98,7 @@ def _model_input(
 
 
 def _missing_reason(row: TrialPrediction, stroke: Stroke | None) -> str | None:
-    """Return why there is nothing to solve; None where all is there."""
+    """Return why there is nothing to solve; None with complete input."""
     if stroke is None:
         return "No stroke was found in this trial."
     if not stroke.kept:
@@ -130,13 +130,13 @@ def _scene(row: TrialPrediction, options: PredictionOptions) -> Scene:
 
 
 def opposite(scene: Scene) -> Scene:
-    """Return the same press, slid the other way, its settled state alone."""
+    """Return the same press with the opposite slide, settled state only."""
     slide = SLIDES[-scene.loading.direction]
     return replace(scene, loading=replace(scene.loading, slide=slide), solve=replace(scene.solve, course="steady"))
 
 
 def scene_along(row: TrialPrediction, variant: Variant, options: PredictionOptions) -> Scene | str:
-    """Return the settled scene of a predicted trial in a variant, or why there is none."""
+    """Return the settled scene of a trial in a variant, or why there is none."""
     if row.mu is None or row.tau_max is None or row.direction is None or row.indentation is None:
         return row.reasons.get("sed", "The trial gives no scene.")
     if variant.driven == "force" and (row.measured_normal is None or row.measured_normal <= 0.0):
@@ -157,7 +157,7 @@ def scene_along(row: TrialPrediction, variant: Variant, options: PredictionOptio
 
 
 def with_loads(scene: Scene, loads: Mapping[str, float]) -> Scene:
-    """Return a scene with another "mu" [-], "tau_max" [MPa] as the model gets it, or driving "force" [N]."""
+    """Return a scene with another "mu" [-], "tau_max" [MPa] in the model's reading, or driving "force" [N]."""
     friction, loading = scene.friction, scene.loading
     mu, tau_max = loads.get("mu", friction.mu), loads.get("tau_max", friction.tau_max)
     force = loads.get("force", loading.normal_force)
@@ -169,7 +169,7 @@ def with_loads(scene: Scene, loads: Mapping[str, float]) -> Scene:
 
 
 def part_of(progress: Progress | None, low: float, high: float) -> Progress | None:
-    """Scale a progress callback to the piece of the work from `low` to `high` of the whole."""
+    """Scale a progress callback to the part from `low` to `high` of the whole."""
     return None if progress is None else lambda share: progress(low + (high - low) * share)
 
 
@@ -185,14 +185,14 @@ def predict_scenes(scenes: Sequence[Scene], progress: Progress | None = None) ->
 
 
 def quick(scene: Scene) -> Scene:
-    """Return a scene without the long estimates of omitted effects, which take as long as the answer."""
+    """Return a scene without the full estimates of omitted effects, which take as long as the answer."""
     return replace(scene, solve=replace(scene.solve, evidence="quick"))
 
 
 def seds_at(
     strokes: Sequence[tuple[float, float, float, int, float]], options: PredictionOptions
 ) -> tuple[float | None, ...]:
-    """Return the settled SED [MPa] by mu, tau_max [MPa], depth [mm], direction and speed; None where none settles."""
+    """Return the settled SED [MPa] for mu, tau_max [MPa], depth [mm], direction and speed; None where none settles."""
     base = template(options)
     scenes = [
         replace(
@@ -207,9 +207,9 @@ def seds_at(
 
 
 def slides(predictions: Sequence[Prediction], progress: Progress | None = None) -> Iterator[Nearby | None]:
-    """Yield the slide of each prediction, from which others and derivatives are a few small systems away.
+    """Yield the slide of each prediction, from which neighbours and derivatives take only a few small systems.
 
-    None where there is none that does not depend on the way to it. Raises Cancelled.
+    None where the slide depends on the path to it. Raises Cancelled.
     """
     for number, slide in enumerate(nearby(predictions)):
         report_part(progress, number / len(predictions))
@@ -217,12 +217,12 @@ def slides(predictions: Sequence[Prediction], progress: Progress | None = None) 
 
 
 def derivatives_by(slide: Nearby, scene: Scene) -> Mapping[str, Mapping[str, float]]:
-    """Return the derivatives, by each load that `with_loads` knows, at the slide of a scene.
+    """Return the derivatives, by each load of `with_loads`, at the slide of a scene.
 
     They are of "sed" [MPa], the finger's "normal_force" and "tangential_force" [N], and the "indentation" [mm].
     """
     derivatives, force, width = slide.derivatives(), scene.loading.normal_force, scene.finger.width
-    per_mm = 0.0 if force is None else (scene.normal_force or 0.0) / force  # of a force as it is given
+    per_mm = 0.0 if force is None else (scene.normal_force or 0.0) / force  # per unit of the given force
 
     def by_load(slope: Gradient, unit: float = 1.0) -> dict[str, float]:
         by_force = per_mm * (slope.normal_force or 0.0)
@@ -237,20 +237,20 @@ def derivatives_by(slide: Nearby, scene: Scene) -> Mapping[str, Mapping[str, flo
 
 
 def doubt_of(prediction: Prediction) -> str:
-    """Return why numbers are not to be believed where the model was driven beyond its range, else ""."""
+    """Return a warning where the model was driven beyond its range, else ""."""
     return inside_out_warning(prediction.audits)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SolutionPath:
-    """How the model came to its answer for one trial, for pictures of it."""
+    """The model's way to the answer of one trial, for pictures."""
 
     scene: Scene
     finger: LinearFinger
-    march: tuple[Instant, ...] | None  # None where it has none that can be drawn
+    march: tuple[Instant, ...] | None  # None without one that can be drawn
 
 
-Watch = Callable[[int, TrialPrediction, SolutionPath | None], None]  # position of the row, the row, how it was found
+Watch = Callable[[int, TrialPrediction, SolutionPath | None], None]  # position of the row, the row, its solution path
 
 
 def predict(
@@ -261,12 +261,12 @@ def predict(
     watch: Watch | None = None,
     first: int | None = None,
 ) -> SessionPrediction:
-    """Return what the model predicts for every trial of `plan`, or for every stroke where it plans none.
+    """Return the predictions for every trial of `plan`, or for every stroke where it has none.
 
-    The finger is the one asked for, or else the published one with what the plan knows of the subject's own. A trial
-    without friction, depth or a settled state keeps its row, with the reason. The row at position `first` is solved
-    first. `watch` takes each row as soon as it is known, at finite strain once all are. Raises SceneError where the
-    options make no scene, Cancelled where `progress` says so.
+    The finger is that of the options, or else the published one with the plan's values of the subject. A trial without
+    friction, depth or a settled state keeps its row, with the reason. The row at position `first` is solved first.
+    `watch` takes each row once it is known, at finite strain once all are. Raises SceneError where the options give no
+    valid scene, Cancelled when `progress` returns False.
     """
     options = with_own_finger(options or PredictionOptions(), plan)
     inputs, width = list(model_inputs(analysis, plan, options)), template(options).finger.width
@@ -277,7 +277,7 @@ def predict(
         report(number, rows[number], None)
     order = sorted(scene_of_row, key=lambda n: (n != first, n))
     scenes = [scene_of_row[n] for n in order]
-    is_small = options.kinematics == "small"  # a depth is matched on its finger: finite strain would put it elsewhere
+    is_small = options.kinematics == "small"  # depths are matched at small strain; finite strain has others
     forces = {n: force / width for n in order if is_small and (force := rows[n].measured_normal) is not None}
     depths = dict(zip(forces, matching_depths([scene_of_row[n] for n in forces], [*forces.values()]), strict=True))
     solutions: dict[int, SolutionPath] = {}
@@ -315,7 +315,7 @@ def predict(
 def _fill_row(
     model_input: ModelInput, answer: Prediction | SolveFailure, mirror: Prediction | SolveFailure, depth: float | None
 ) -> TrialPrediction:
-    """Return the row with the solver's numbers, and with the reason for each one that is missing."""
+    """Return the row with the solver's numbers, and with reasons for missing ones."""
     row, scene = model_input
     assert scene is not None  # the caller solved it
     reasons: dict[str, str] = {}

@@ -1,7 +1,7 @@
-"""Predictions sealed before anybody may know which score belongs to which stimulus, and what a report says of it.
+"""Predictions sealed before unblinding, and their sentence in a report.
 
-The seal is a file in the session's folder: what was predicted, its SHA-256 and the time. `daq-app unblind` writes the
-SHA-256 of that file with the key it opens, so that a later or changed seal is detected.
+The seal is a file in the session's folder with the predictions, their SHA-256 and the time. `daq-app unblind` writes
+the SHA-256 of that file with the key it opens, so that a later or changed seal is detected.
 """
 
 import hashlib
@@ -21,9 +21,9 @@ _SAME = 1e-12  # relative difference allowed to numbers from another machine [-]
 
 
 def seal_prediction(recording: Recording, prediction: Mapping[str, Any]) -> str:
-    """Seal what `SessionPrediction.to_dict` returned, in the session's folder; return the SHA-256 of its numbers.
+    """Seal the result of `SessionPrediction.to_dict` in the session's folder; return the SHA-256 of its numbers.
 
-    Raises RecordingError where a seal is there, for none replaces another, or where nothing can be written.
+    Raises RecordingError where a seal exists, which is never replaced, or where writing fails.
     """
     check_unsealed(recording)
     numbers = [{name: row[name] for name in SEAL_NUMBERS} for row in prediction["trials"]]
@@ -61,7 +61,7 @@ def digest(numbers: Sequence[Mapping[str, Any]]) -> str:
 def sealed_sentence(recording: Recording, current: Sequence[Mapping[str, Any]]) -> str:
     """Return whether the predictions that a report shows (`SEAL_NUMBERS` of each) were sealed, when and how blind.
 
-    A seal that cannot be read proves nothing, and stands in the way of nothing else.
+    An unreadable seal proves nothing, and prevents nothing else.
     """
     try:
         seal = load_derived(recording.folder, SEAL)

@@ -1,4 +1,4 @@
-"""What the model predicts for each trial, in each variant and for a session, and its form as plain data."""
+"""Predictions for each trial, each variant and a session, and their form as plain data."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -17,29 +17,29 @@ from solver import Prediction, Scene
 from solver.prediction import History, Response, Skin
 from solver.response.fields import Fields, fields_of
 
-Method = Literal["derivatives", "sampling"]  # by the solver's converged tangent; by draws that are solved
+Method = Literal["derivatives", "sampling"]  # by the solver's converged tangent; by solved draws
 Ends = tuple[float, float]
 Number = float | None
 
 
 @dataclass(frozen=True, slots=True)
 class SedInterval:
-    """The 95 % interval of one SED that friction makes, and the force where that drives: not the model's error.
+    """The 95 % interval of one SED from friction, and from a driving force: not the model's error.
 
-    With it those of the same state's forces and depth, by the tangent alone; None where there is no tangent.
+    Includes intervals of the state's forces and depth, from the tangent alone; None without a tangent.
     """
 
     low: float | None  # [MPa]; None where `reason` says why
     high: float | None
     method: Method | None
-    # Derivatives by the converged tangent: where the method is sampling, they hold close to the friction found alone
+    # Derivatives from the converged tangent; with sampling they hold only close to the measured friction
     by_mu: float | None = None  # of the SED by mu [MPa]
-    by_tau_max: float | None = None  # by tau_max as the model gets it [-]
-    by_force: float | None = None  # by the normal force, where that drives the model [MPa/N]
+    by_tau_max: float | None = None  # by tau_max in the model's reading [-]
+    by_force: float | None = None  # by the normal force, where it drives the model [MPa/N]
     reason: str = ""
     normal_force: Ends | None = None  # of the whole finger [N]
     tangential_force: Ends | None = None  # [N]
-    indentation: Ends | None = None  # found under a force [mm]; both ends alike where it was given
+    indentation: Ends | None = None  # under a force [mm]; both ends equal where it was given
 
 
 Driven = Literal["depth", "force", "other way"]
@@ -47,7 +47,7 @@ Driven = Literal["depth", "force", "other way"]
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """How a trial is predicted."""
+    """A variant of a prediction."""
 
     kinematics: Annotated[Literal["small", "finite"], Meaning("", "small or finite strain")]
     tau_reading: Annotated[
@@ -57,7 +57,7 @@ class Variant:
 
     @property
     def sentence(self) -> str:
-        """It, for people.
+        """The variant, for people.
 
         >>> Variant("finite", "as-printed", "depth").sentence
         'finite strain, tau_max as printed, at the planned depth'
@@ -66,7 +66,7 @@ class Variant:
 
     @property
     def conditions(self) -> str:
-        """It, without the strain."""
+        """The variant without the strain, for people."""
         reading = "tau_max as printed, " if self.tau_reading == "as-printed" else ""
         return f"{reading}{_DRIVEN[self.driven]}"
 
@@ -97,16 +97,16 @@ class Alternative:
     normal_force: Annotated[Number, Meaning("N", "the model's, times the finger's width")]
     tangential_force: Annotated[Number, Meaning("N", "likewise")]
     reason: Annotated[str, Meaning("", "why there is no number")] = ""
-    traction: float | None = None  # the greatest friction traction on the skin: below tau_max that bounds nothing [MPa]
-    interval: SedInterval | None = None  # of the SED, where it was asked for
+    traction: float | None = None  # greatest friction traction on the skin: below tau_max the bound has no effect [MPa]
+    interval: SedInterval | None = None  # of the SED, where requested
     normal_force_error: float | None = None  # estimated by the solver, of normal_force, relative [-]; None: given
-    tangential_force_error: float | None = None  # likewise of tangential_force
-    indentation_error: float | None = None  # likewise of the indentation; None where that was given
-    doubt: str = ""  # why the numbers are not to be believed, where the model was driven beyond its range
+    tangential_force_error: float | None = None  # the same for tangential_force
+    indentation_error: float | None = None  # the same for the indentation; None where it was given
+    doubt: str = ""  # a warning where the model was driven beyond its range
 
 
 def variants(choice: Literal["none", "small", "both"]) -> Iterator[Variant]:
-    """Yield the variants asked for: those at small strain, or those at finite strain too."""
+    """Yield the variants of a choice: at small strain, or also at finite strain."""
     for kinematics in _KINDS[choice]:
         yield Variant(kinematics, "computed", "depth")
         yield Variant(kinematics, "as-printed", "depth")
@@ -114,10 +114,10 @@ def variants(choice: Literal["none", "small", "both"]) -> Iterator[Variant]:
         yield Variant(kinematics, "computed", "other way")
 
 
-_OPTIONAL = ("interval", "opposite_interval")  # of a row as plain data: absent unless asked for
+_OPTIONAL = ("interval", "opposite_interval")  # of a row as plain data: absent unless requested
 _PARTS = ("stimulus", *_OPTIONAL)
 
-# Options as they were called until 2026-11-26, and what they are called now. Documents hold both names for one release.
+# Names of options until 2026-11-26, and present names. Documents hold both for one release.
 _PRESENT_NAMES = {"beside": "variants", "beside_intervals": "variant_intervals"}
 
 
@@ -127,7 +127,7 @@ def known_error(prediction: Prediction, error: float | None) -> float | None:
 
 
 def settled_numbers(answer: Prediction) -> dict[str, Any]:
-    """Return SED [MPa] and forces of the whole finger [N] with their relative errors, as `TrialNumbers` names them."""
+    """Return SED [MPa] and forces of the whole finger [N] with relative errors, by their names in `TrialNumbers`."""
     width = answer.scene.finger.width
     return {
         "sed": answer.sed_ending,
@@ -141,7 +141,7 @@ def settled_numbers(answer: Prediction) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialNumbers:
-    """The model's numbers of one trial, or one stroke without trials; None where `reasons` says why, by name."""
+    """The model's numbers of one trial, or of one stroke without a plan; None where `reasons` says why, by name."""
 
     trial: Annotated[int | None, Meaning("", "number of the trial")]
     stroke: Annotated[int | None, Meaning("", "position of the stroke it was made for, from 0")]
@@ -167,40 +167,40 @@ class TrialNumbers:
     reasons: Annotated[Mapping[str, str], Meaning("", "for each number left out, why")] = field(
         default_factory=dict[str, str]
     )
-    alternatives: tuple[Alternative, ...] = ()  # the same trial predicted otherwise, where that was asked for
-    interval: SedInterval | None = None  # of `sed`, where it was asked for
+    alternatives: tuple[Alternative, ...] = ()  # the same trial in other variants, where requested
+    interval: SedInterval | None = None  # of `sed`, where requested
     opposite_interval: SedInterval | None = None  # of `opposite_sed`
-    # Estimated by the solver, relative [-]: None where there is no such number, or its error was not solved for
+    # Estimated by the solver, relative [-]: None without such a number, or without an estimate
     normal_force_error: float | None = None
     tangential_force_error: float | None = None
     opposite_error: float | None = None
     matching_depth_error: float | None = None
-    matching_depth_interval: Ends | None = None  # that friction and the measured force make of it [mm]
+    matching_depth_interval: Ends | None = None  # from the uncertainty of friction and the measured force [mm]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class TrialPrediction(TrialNumbers):
-    """The numbers of one trial with all that the solver found."""
+    """The numbers of one trial with the solver's results."""
 
-    prediction: Prediction | None = None  # all that the solver found
-    opposite: Prediction | None = None  # that slid the other way
+    prediction: Prediction | None = None  # the solver's result
+    opposite: Prediction | None = None  # the same for the opposite slide
 
     @property
     def responses(self) -> Mapping[str, Response]:
-        """Return every quantity at the ending by its name; none where there is no prediction."""
+        """Return every quantity at the ending by its name; empty without a prediction."""
         return {} if self.prediction is None else self.prediction.responses
 
     @property
     def history(self) -> History | None:
-        """Return the course in time, where it was asked for."""
+        """Return the time course, where requested."""
         return None if self.prediction is None else self.prediction.history
 
     def picture(self) -> tuple[Fields, Skin] | None:
-        """Return the deformed finger with its SED, and the skin's pressures; None where there is no prediction."""
+        """Return the deformed finger with its SED, and the skin's pressures; None without a prediction."""
         return None if self.prediction is None else (fields_of(self.prediction), self.prediction.skin)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data."""
+        """Return the row as plain data."""
         row: dict[str, Any] = {column.name: getattr(self, column.name) for column in fields(TrialNumbers)}
         row |= {name: asdict(row[name]) for name in _PARTS if row[name] is not None}
         row["reasons"] = dict(self.reasons)
@@ -211,9 +211,9 @@ class TrialPrediction(TrialNumbers):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SessionPrediction:
-    """What the model says of a session."""
+    """The model's predictions for a session."""
 
-    analysis: Analysis  # of the strokes whose friction the model got
+    analysis: Analysis  # of the strokes with the friction that the model used
     trials: tuple[TrialPrediction, ...]
     width: float  # of the finger [mm]
     width_origin: str  # "set" or "assumed"
@@ -221,12 +221,12 @@ class SessionPrediction:
 
     @property
     def finger(self) -> Scene:
-        """The finger that was asked, at the strain that was asked for; its friction and loading mean nothing."""
+        """The finger used, at the chosen strain; its friction and loading are placeholders."""
         finger = template(self.options)
         return replace(finger, solve=replace(finger.solve, kinematics=self.options.kinematics))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data, None where honesty allows no number."""
+        """Return the predictions as plain data, None for withheld numbers."""
         options, settings = asdict(self.options), self.analysis.settings
         default = asdict(PredictionOptions())
         origin = {name: "default" if value == default[name] else "set" for name, value in options.items()}
@@ -241,7 +241,7 @@ class SessionPrediction:
             "width_origin": self.width_origin,
             "options": _with_former_names(options),
             "options_origin": _with_former_names(origin),
-            "scene": asdict(template(self.options)),  # finger, materials and settings as used, defaults filled in
+            "scene": asdict(template(self.options)),  # finger, materials and settings as used, with defaults
         }
 
 
@@ -255,7 +255,7 @@ class _StoredTrial(TrialNumbers):
 
 
 class _Document(msgspec.Struct):
-    """The parts of `prediction.json` that the program itself reads."""
+    """The parts of `prediction.json` that the program reads."""
 
     made_by: dict[str, str]
     trials: tuple[_StoredTrial, ...]
@@ -272,7 +272,7 @@ def _with_former_names(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def with_present_names(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a prediction with each of its options called as it is now, and by that name alone."""
+    """Return a prediction whose options have only their present names."""
     names = {
         name: {_PRESENT_NAMES.get(key, key): value for key, value in cast("dict[str, Any]", table).items()}
         for name in ("options", "options_origin")
@@ -282,19 +282,19 @@ def with_present_names(document: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def check_prediction(document: Mapping[str, Any]) -> None:
-    """Raise ValueError where a document is no prediction that this program writes: where, and what is expected."""
+    """Raise ValueError, with place and expected value, where a document is not a prediction of this program."""
     parts = complete(document, _Document)
     from_table(parts.options, PredictionOptions, "options")
     from_table(parts.scene, Scene, "scene")
 
 
-_SCENE = {"finger": "mm, degrees", "materials": "E in MPa", "receptor": "mm"}  # what all trials share, with its units
+_SCENE = {"finger": "mm, degrees", "materials": "E in MPa", "receptor": "mm"}  # shared by all trials, with units
 _READINGS = {
     "computed": "greatest tangential force over the contact area",
     "as-printed": "a hundredth of that, as the paper's tables are headed",
 }
-UNKNOWNS = "unknowns"  # of the mesh: the name of that fact
-_AUDITS = {  # 0 is perfect, but for the volume
+UNKNOWNS = "unknowns"  # name of the fact about the mesh
+_AUDITS = {  # 0 is perfect, except for the volume ratio
     "equilibrium_x": "imbalance of forces along the surface, as a share of the contact force",
     "equilibrium_y": "imbalance of forces across the surface, as a share of the contact force",
     "inner_forces": "largest unbalanced force inside the tissue, as a share of the contact force",
@@ -312,7 +312,7 @@ _AUDITS = {  # 0 is perfect, but for the volume
 
 
 def model_facts(prediction: SessionPrediction | None) -> tuple[tuple[str, str, str], ...]:
-    """Return name, value and remark of each thing that the model holds; audits are the worst over all trials."""
+    """Return name, value and remark of each fact about the model; audits are the worst over all trials."""
     rows = () if prediction is None else prediction.trials
     predictions = [row.prediction for row in rows if row.prediction is not None]
     if prediction is None or not predictions:
@@ -331,13 +331,13 @@ def model_facts(prediction: SessionPrediction | None) -> tuple[tuple[str, str, s
 
 
 def _worst(audit: str, all_audits: Sequence[Mapping[str, float]]) -> float:
-    """Return the least value of an audit whose name says that it has one, else the greatest."""
+    """Return the least value of an audit named least or smallest, else the greatest."""
     values = [audits[audit] for audits in all_audits if audit in audits]
     return (min(values) if "least" in audit or "smallest" in audit else max(values, key=abs)) + 0.0  # no minus zero
 
 
 def _values(table: Mapping[str, Any]) -> str:
-    """Return a scene's table in words, mm, degrees and MPa as in a scene file; what is not set is left out.
+    """Return a scene's table in words, mm, degrees and MPa as in a scene file; unset values are left out.
 
     >>> _values({"E": 0.08, "law": None, "prony": ({"g": 0.2, "tau": 0.07},)})
     'E 0.08; prony (g 0.2, tau 0.07)'
@@ -346,7 +346,7 @@ def _values(table: Mapping[str, Any]) -> str:
     return "; ".join(f"{name} {_value(value)}" for name, value in items)
 
 
-def _value(value: Any) -> str:  # noqa: ANN401  whatever a scene file holds
+def _value(value: Any) -> str:  # noqa: ANN401  any value of a scene file
     if isinstance(value, Mapping):
         items = cast("Mapping[str, Any]", value).items()
         return ", ".join(f"{name} {_value(item)}" for name, item in items if item not in (None, ()))

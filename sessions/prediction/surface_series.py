@@ -1,7 +1,7 @@
-"""Responses to series of surfaces: over which fingers they rise or fall, and those of simulated people's strokes.
+"""Responses to series of surfaces: their slopes on a finger, and their values in simulated strokes.
 
 A series is the five published surfaces of one descriptor, stroked in its direction and pressed to its depth. A finger
-is a scene whose own friction and loading do not matter here.
+is a scene whose friction and loading are ignored here.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,12 +18,12 @@ from solver.scene.published import SLIPPERINESS, STICKINESS, Surface, scene
 
 SERIES: Mapping[str, tuple[Surface, ...]] = {"stickiness": STICKINESS, "slipperiness": SLIPPERINESS}
 _SED = NAMES.index("sed")
-_LEAST = 3  # surfaces with a settled state that a slope is taken of
+_LEAST = 3  # surfaces with a settled state for a slope
 
 
 @dataclass(frozen=True, slots=True)
 class Press:
-    """How the finger is pressed: to a share of each series' own depth, or by one force."""
+    """Load of the finger: a share of each series' own depth, or one force."""
 
     depth: float = 1.0  # of the published depth of the series [-]
     force: float | None = None  # [N/mm], in place of a depth
@@ -31,17 +31,17 @@ class Press:
 
 @dataclass(frozen=True, slots=True)
 class Slopes:
-    """The relation of every quantity at the ending to the surfaces of one series. nan where too few have an answer."""
+    """The relation of each quantity at the ending to the surfaces of a series; nan where too few settle."""
 
     surfaces: int  # with a settled state
     with_index: Array  # (q,) correlation with the maker's index [-]
-    change: Array  # (q,) by the least-squares line over the range of mu, by the mean size; its sign is the slope's [-]
+    change: Array  # (q,) of the line over the range of mu, relative to the mean size, with the slope's sign [-]
 
 
 def series_slopes(
     finger: Scene, press: Press | None = None, arcs: Sequence[float] = (0.0,)
 ) -> Mapping[str, tuple[Slopes, ...]] | str:
-    """Return for each series the slopes at receptors at arc positions [mm] along the skin, or why there are none.
+    """Return the slopes of each series at receptors at arc positions [mm] along the skin, or why there are none.
 
     Settled sliding at the kinematics of `finger`. A surface without a settled state is left out of its series.
     """
@@ -58,7 +58,7 @@ def series_slopes(
 
 
 def other_signs(finger: Scene) -> list[str]:
-    """Return a sentence for each series over which the SED goes another way on a finger than on the published one.
+    """Return a sentence for each series with opposite slopes of the SED on a finger and on the published one.
 
     Both at the kinematics of `finger`, pressed to the published depths; [] for the published finger itself.
     """
@@ -106,30 +106,30 @@ PERSON, _STROKE = 0.08, 0.05  # standard deviation of ln mu between people, and 
 _PRESS = 0.2  # standard deviation of ln N from stroke to stroke [-]
 AREA = 100.0  # of the contact [mm2]
 USUAL_SPEED = 20.0  # [mm/s]
-STIFFNESS = 1.2  # normal force by depth^1.5, as of Hertz's sphere: 3.4 N at 2 mm [N/mm^1.5]
+STIFFNESS = 1.2  # normal force over depth^1.5, as for a Hertz sphere: 3.4 N at 2 mm [N/mm^1.5]
 
 
 @dataclass(frozen=True, slots=True)
 class StudyDesign:
-    """What each subject of a study strokes: every surface at every depth."""
+    """Strokes of each subject of a study: every surface at every depth."""
 
     mu: tuple[float, ...]  # of each surface
-    force: tuple[float, ...]  # usual normal force in each trial of a person, surface by surface within depths [N]
-    speed: tuple[float, ...]  # likewise [mm/s]
+    force: tuple[float, ...]  # usual normal force in each trial, ordered by depth, then by surface [N]
+    speed: tuple[float, ...]  # usual speed in each trial [mm/s]
     depths: tuple[float, ...] = (2.0,)  # [mm]
 
     @classmethod
     def even(cls, surfaces: int, depths: tuple[float, ...]) -> "StudyDesign":
-        """Return a design whose friction is evenly spaced over that of the published surfaces."""
+        """Return a design whose friction is evenly spaced over the range of the published surfaces."""
         mu = np.linspace(0.24, 0.67, surfaces).tolist()
         force = tuple(STIFFNESS * depth**1.5 for depth in depths for _ in mu)
         return cls(tuple(mu), force, (USUAL_SPEED,) * len(force), depths)
 
 
 def simulated_strokes(design: StudyDesign, people: int, draw: np.random.Generator) -> Mapping[str, Array]:
-    """Return every quantity of each simulated stroke (people, surfaces within depths); nan where there is none.
+    """Return every quantity of each simulated stroke (people, surfaces within depths); nan without a state.
 
-    Friction, its bound and the normal force vary by stroke; the model's quantities are of the published finger there.
+    Friction, its bound and the normal force vary by stroke; the model has the published finger.
     """
     shape = (people, len(design.mu) * len(design.depths))
     moist = PERSON * draw.standard_normal((people, 1)) + _STROKE * draw.standard_normal(shape)

@@ -1,13 +1,13 @@
-"""How far a prediction may differ: by how uncertain its friction is, and in other variants of the model.
+"""Uncertainty of a prediction from that of its friction, and its values in other variants of the model.
 
-The draws of the friction's bootstrap go through the solver. Derivatives from its converged tangent carry all of them.
-Whether that suffices is seen from a few draws that are solved: those at both ends of the interval, and those at both
-ends of every direction in which the draws spread, since those of mu and tau_max are correlated. Where it does not, the
-solver is run at draws themselves. Each interval says which. A trial predicted by the force measured has the uncertainty
-of that force in it too.
+The draws of the friction's bootstrap go through the solver. Derivatives from its converged tangent carry all of them. A
+few solved draws show whether that suffices: those at both ends of the interval, and those at both ends of every
+principal direction of the draws, since mu and tau_max are correlated. Where it does not suffice, the solver is run at
+draws themselves. Each interval states its method. A trial driven by the measured force also includes the uncertainty of
+that force.
 
-Each variant is solved for all trials together on a mesh of its own, so that the surfaces' differences within one are
-accurate; between two they are as good as each one's error estimate.
+Each variant is solved for all trials together on its own mesh, so differences between surfaces within a variant are
+accurate; between variants each one's error estimate applies.
 """
 
 from collections.abc import Sequence
@@ -44,18 +44,18 @@ from solver.response.nearby import Nearby
 
 DrawsOrReason = FrictionDraws | str  # draws of a trial's friction, or why there are none
 
-_SAMPLES = 60  # draws that are solved where derivatives do not suffice
-MISS = 0.05  # part of the interval's width by which derivatives may miss a draw that is solved [-]
-_FLAT = 1e-5  # a miss below this share of the SED is of no account [-]
+_SAMPLES = 60  # draws to solve where derivatives do not suffice
+MISS = 0.05  # largest miss of a solved draw by derivatives, relative to the interval's width [-]
+_FLAT = 1e-5  # a miss below this share of the SED is negligible [-]
 _QUANTILES = (0.025, 0.975)
 
 
 def with_intervals(
     prediction: SessionPrediction, progress: Progress | None = None, *, both_ways: bool = True
 ) -> SessionPrediction:
-    """Return a prediction with an interval of each SED it holds, where its options ask for them.
+    """Return a prediction with an interval of each of its SEDs, where its options request them.
 
-    They are of each trial, and with `both_ways` of it slid back. Raises Cancelled where `progress` returns False.
+    Each trial has one, and with `both_ways` also its opposite slide. Raises Cancelled where `progress` returns False.
     """
     if not prediction.options.intervals:
         return prediction
@@ -71,7 +71,7 @@ def with_intervals(
 
 
 def draws_of(prediction: SessionPrediction) -> list[DrawsOrReason]:
-    """Return the draws of each trial's friction, one in each repeat, or why there are none."""
+    """Return the draws of each trial's friction, one for each repeat, or why there are none."""
     draws: list[DrawsOrReason] = []
     strokes, bootstrap = prediction.analysis.strokes, prediction.analysis.bootstrap
     for row in prediction.trials:
@@ -90,9 +90,9 @@ def _reason(row: TrialPrediction, name: str) -> str:
 def intervals_of(
     column: Sequence[Prediction | str], draws: Sequence[DrawsOrReason], scale: float, progress: Progress | None = None
 ) -> list[SedInterval]:
-    """Return the interval of each settled SED of a column, or what stands there why there is none.
+    """Return the interval of each settled SED of a column; a reason in the column becomes the interval's.
 
-    `scale` is what tau_max as drawn is multiplied by before the model gets it. Raises Cancelled.
+    `scale` is the factor of drawn tau_max for the model. Raises Cancelled.
     """
     taken_up = slides([answer for answer in column if not isinstance(answer, str)], progress)
     results = (
@@ -135,10 +135,10 @@ def _interval(prediction: Prediction, slide: Nearby | None, friction: DrawsOrRea
         return prediction.sed_ending + (seds[1:] - seds[0])
 
     extremes = _extremes(linear, draws)
-    errors = np.abs(solve_draws(extremes) - linear[extremes])  # nan, and so no less, where one has no settled state
+    errors = np.abs(solve_draws(extremes) - linear[extremes])  # nan, hence no pass, where one has no settled state
     if bool((errors <= max(MISS * (high - low), _FLAT * prediction.sed_ending)).all()):
         return interval
-    # Each stands for an equal share of all: the middle one, by what the derivatives carry.
+    # Each represents an equal share of all draws, by the middle one in the order of the linear estimate.
     middles = ((np.arange(_SAMPLES) + 0.5) / _SAMPLES * len(linear)).astype(np.int64)
     seds = solve_draws(np.argsort(linear, kind="stable")[middles])
     failed = int(np.isnan(seds).sum())
@@ -147,7 +147,7 @@ def _interval(prediction: Prediction, slide: Nearby | None, friction: DrawsOrRea
             f"{failed} of {_SAMPLES} draws of the friction have no settled state, or lie too near the limit to tell"
         )
         return replace(interval, low=None, high=None, method="sampling", reason=reason)
-    low, high = np.quantile(seds, _QUANTILES, method="hazen").tolist()  # each stands for the middle of its share
+    low, high = np.quantile(seds, _QUANTILES, method="hazen").tolist()  # each represents the middle of its share
     return replace(interval, low=low, high=high, method="sampling")
 
 
@@ -157,7 +157,7 @@ def _bounds(draws: Array) -> Ends:
 
 
 def _loads(scene: Scene, friction: DrawsOrReason, scale: float) -> tuple[tuple[str, ...], Array, Array] | str:
-    """Return the names of the loads that were drawn (p,), the draws (repeats, p) and what each is in the scene (p,)."""
+    """Return the names of the drawn loads (p,), the draws (repeats, p) and the scene's values (p,)."""
     if isinstance(friction, str):
         return friction
     names, columns = ["mu", "tau_max"], [np.maximum(friction.mu, 0.0), friction.tau_max * scale]
@@ -172,10 +172,10 @@ def _loads(scene: Scene, friction: DrawsOrReason, scale: float) -> tuple[tuple[s
 
 
 def _extremes(linear: Array, draws: Array) -> Indices:
-    """Return the draws at both ends of the interval carried, and of each direction in which draws (repeats, p) spread.
+    """Return the draws at both ends of the linear interval, and of each principal direction of draws (repeats, p).
 
-    The directions are the principal components of the draws, each load by its own spread: where loads are correlated,
-    the corners that the draws do reach.
+    The directions are the principal components of the draws, each load scaled by its spread: for correlated loads these
+    are corners within reach of the draws.
 
     >>> _extremes(np.arange(5.0), np.array([[0.0, 0.0], [1.0, 1.1], [2.0, 1.9], [3.0, 3.0], [4.0, 4.2]])).tolist()
     [0, 2, 4]
@@ -188,10 +188,10 @@ def _extremes(linear: Array, draws: Array) -> Indices:
 
 
 def with_alternatives(prediction: SessionPrediction, progress: Progress | None = None) -> SessionPrediction:
-    """Return a prediction with every trial predicted in the variants that its options ask for (`variants`) as well.
+    """Return a prediction with every trial also predicted in the variants of its options (`variants`).
 
-    Where the options ask for `intervals`, each at small strain has its own, and each at finite strain where they ask
-    for `variant_intervals`. Raises Cancelled where `progress`, called with the part done, returns False.
+    With `intervals` in the options, each variant at small strain has its own interval, and with `variant_intervals`
+    each at finite strain. Raises Cancelled where `progress`, called with the part done, returns False.
     """
     all_variants, options = tuple(variants(prediction.options.variants)), prediction.options
     draws = draws_of(prediction) if all_variants and options.intervals else None
@@ -208,9 +208,9 @@ def with_alternatives(prediction: SessionPrediction, progress: Progress | None =
 
 
 def _with_depth(row: TrialPrediction, options: PredictionOptions) -> TrialPrediction:
-    """Return a row whose matching depth is that of its own solve under the measured force, where there is one.
+    """Return a row with the matching depth of its own solve under the measured force, where there is one.
 
-    The depth of `predict` is of a rough mesh; one question has one answer.
+    The depth of `predict` is from a coarse mesh; the report gives one value only.
     """
     driven = Variant(options.kinematics, options.tau_reading, "force")
     by_force = (alternative for alternative in row.alternatives if alternative.variant == driven)
@@ -230,14 +230,14 @@ def _with_depth(row: TrialPrediction, options: PredictionOptions) -> TrialPredic
 def _alternatives(
     prediction: SessionPrediction, variant: Variant, draws: Sequence[DrawsOrReason] | None, progress: Progress | None
 ) -> tuple[Alternative, ...]:
-    """Return what each trial gives in one variant, with intervals where draws of its friction are given."""
+    """Return each trial's result in one variant, with intervals where draws of its friction are given."""
     rows, options = prediction.trials, prediction.options
     trial_answers = _present_answers(prediction, variant)
     answers = trial_answers or _solve_variant(prediction, variant, part_of(progress, 0.0, 0.8))
     alternatives = [_alternative(row, variant, *answer) for row, answer in zip(rows, answers, strict=True)]
     if draws is not None:
         present = [row.interval if variant.driven == "depth" else row.opposite_interval for row in rows]
-        if trial_answers is not None and None not in present:  # they are those of the trials themselves
+        if trial_answers is not None and None not in present:  # already the intervals of the trials themselves
             intervals: Sequence[SedInterval | None] = present
         else:
             scale = tau_scale(replace(options, tau_reading=variant.tau_reading))
@@ -247,12 +247,12 @@ def _alternatives(
     return tuple(alternatives)
 
 
-# For each trial the tau_max [MPa] that the model got, and what of it
+# For each trial the tau_max [MPa] of the model, and its result
 _Answers = list[tuple[float | None, Prediction | str]]
 
 
 def _present_answers(prediction: SessionPrediction, variant: Variant) -> _Answers | None:
-    """Return the answers that the prediction holds already: at the planned depth, slid either way."""
+    """Return answers already in the prediction: at the planned depth, for either slide; else None."""
     options = prediction.options
     agrees = (variant.kinematics, variant.tau_reading) == (options.kinematics, options.tau_reading)
     if agrees and variant.driven == "depth":
@@ -287,7 +287,7 @@ def _alternative(
         tau_max,
         answer.indentation,
         **settled_numbers(answer),
-        traction=float(abs(answer.skin.traction).max()),  # any tau_max beyond it has the same solution
+        traction=float(abs(answer.skin.traction).max()),  # any greater tau_max has the same solution
         indentation_error=known_error(answer, answer.indentation_error),
         doubt=doubt_of(answer),
     )

@@ -29,12 +29,12 @@ from sessions.strokes.stroke import FIXED, AreaLaw
 
 @dataclass(frozen=True, slots=True)
 class Further:
-    """What a report can hold beside the prediction itself."""
+    """Optional parts of a report, besides the prediction itself."""
 
-    firing: Sequence[Firing] = ()  # of each trial with a course
+    firing: Sequence[Firing] = ()  # of each trial with a time course
     afferent: tuple[Fact, ...] = ()  # the parameters that `firing` was computed with
-    firing_settings: AfferentSettings | None = None  # the same as they are asked for; None: no firing was asked for
-    response: str = SED.name  # the quantity at the ending that is held against scores
+    firing_settings: AfferentSettings | None = None  # settings of the firing; None: no firing requested
+    response: str = SED.name  # the quantity at the ending that is compared with scores
     paths: Mapping[int, Values] | None = None  # trial -> that quantity along many paths of the analysis
     unreadable: tuple[str, ...] = ()  # a sentence for each session of the study that cannot be read
 
@@ -50,8 +50,8 @@ def findings(
     """Return the findings of a session.
 
     `scores` are the tables of further visits, of this subject or others, joined by subject code; the session's own
-    scores are always among them. `ground_truth` is what a simulator set in each trial; None for real sessions.
-    `further` is what took more solves, or was asked for.
+    scores are always included. `ground_truth` is what a simulator set in each trial; None for real sessions. `further`
+    holds optional parts that take more solves.
     """
     plan, tables = recording.plan, distinct_sessions((score_table(recording), *(scores or ())))
     extras = further or Further()
@@ -91,7 +91,7 @@ def findings(
 def numbers_alone(
     recording: Recording, analysis: Analysis, prediction: SessionPrediction | None, extras: Further
 ) -> Report:
-    """Return a report of strokes and predictions alone: nothing is held against scores, so it may be blinded."""
+    """Return a report of strokes and predictions only, without scores, so the session may be blinded."""
     undone = {record.trial.number for record in recording.trials if record.outcome == "open"}
     return Report(
         session=recording.folder.name,
@@ -110,7 +110,7 @@ def numbers_alone(
 
 
 def _simulation_notice(recording: Recording, tables: Sequence[ScoreTable]) -> str:
-    """Return the first line of everything made of this session when any of it was simulated, else ""."""
+    """Return the first line of every document on this session if any part was simulated, else ""."""
     if recording.simulated_sentence is not None:
         return recording.simulated_sentence
     simulated = sum(table.simulated for table in tables)
@@ -121,10 +121,10 @@ def _simulation_notice(recording: Recording, tables: Sequence[ScoreTable]) -> st
 def experiments(
     plan: SessionPlan, tables: Sequence[ScoreTable], visit: Visit, law: AreaLaw = FIXED, response: str = SED.name
 ) -> tuple[Experiment, ...]:
-    """Return one experiment a block; `visit` holds its trials with what was measured and predicted.
+    """Return one experiment for each block; `visit` holds the trials with measurements and predictions.
 
-    `response` names the quantity of the model that is held against scores and rivals, and that the paths of the visit
-    hold. `law` gives the contact area of every number but theirs.
+    `response` names the model's quantity that is compared with scores and rivals, and the quantity of the visit's
+    paths. `law` gives the contact area of all numbers except those of the paths.
     """
     label = BY_NAME[response].label
     blocks: list[Experiment] = []
@@ -184,6 +184,6 @@ def _surface_series(trials: Sequence[TrialRow]) -> dict[str, dict[int, float]]:
 
 
 def _relation(x: Mapping[int, float], responses: Mapping[int, float]) -> Relation | None:
-    """Return how responses go with x, over the indices that have both; None where there is none."""
+    """Return the relation of responses to x, over the indices that have both; None without any."""
     indices = sorted(x.keys() & responses.keys())
     return relation([x[i] for i in indices], [responses[i] for i in indices], indices) if indices else None

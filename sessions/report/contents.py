@@ -1,4 +1,4 @@
-"""What a report holds, ready for any export. Numbers that are missing carry their reason."""
+"""Content of a report, ready for any export. Missing numbers have a reason."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -23,14 +23,14 @@ Numbers = tuple[float, ...]
 
 
 def same_fields(source: "DataclassInstance", target: "type[DataclassInstance]") -> dict[str, Any]:
-    """Return what a record holds in the fields that another kind of record has too, by name."""
+    """Return the values of a record's fields that another type of record also has, by name."""
     names = {field.name for field in fields(source)} & {field.name for field in fields(target)}
     return {name: getattr(source, name) for name in names}
 
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """One thing somebody must know to judge or repeat the session."""
+    """One fact needed to judge or repeat the session."""
 
     name: str
     value: str
@@ -39,7 +39,7 @@ class Fact:
 
 @dataclass(frozen=True, slots=True)
 class TextFile:
-    """A file that somebody needs beside the session, whole in the report."""
+    """A file needed in addition to the session, whole in the report."""
 
     name: str
     text: str
@@ -55,22 +55,22 @@ class Experiment:
     scale_ends: tuple[str, str]
     indices: tuple[int, ...]  # of its stimuli, rising
     scores: tuple[MeanScore, ...]
-    answers: Mapping[str, tuple[float | None, ...]]  # of each subject, one for each index; None where it gave none
+    answers: Mapping[str, tuple[float | None, ...]]  # of each subject, one for each index; None without an answer
     score_relation: Relation | None  # `response` [MPa or -] against mean score; None where one of the two is missing
     index_relation: Relation | None  # `response` against index
-    own_relation: Relation | None = None  # `response` against the scores of whoever made the strokes, one of several
-    rivals: tuple[Rival, ...] = ()  # the SED first, and what else follows the mean scores
-    paths: tuple[PathFinding, ...] = ()  # the first of them along many paths of the analysis, where they were asked for
+    own_relation: Relation | None = None  # `response` against the stroking subject's own scores, where several scored
+    rivals: tuple[Rival, ...] = ()  # `response` first, then its rivals for the mean scores
+    paths: tuple[PathFinding, ...] = ()  # correlations along many paths of the analysis, where requested
     psychometric: Psychometric | None = None  # of comparisons with a standard, where the block has one
     own_scores: Mapping[int, float] = field(default_factory=dict[int, float])  # of that subject, by index
-    response: str = "sed"  # the quantity at the ending whose relations these are, one of `solver.quantities`
-    # Numbers and choices: trial, what was judged, answer; none where `psychometric` is made of them
+    response: str = "sed"  # the quantity at the ending of these relations, one of `solver.quantities`
+    # Numbers and choices: trial, judged index, answer; empty where `psychometric` uses them
     other_answers: tuple[tuple[int, str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trace:
-    """The course of one stroke at m instants. Ratio and speed are nan where they mean nothing."""
+    """The course of one stroke at m instants. Ratio and speed are nan where undefined."""
 
     origin: float  # contact onset, or the recording's beginning where it begins in contact [s, device time]
     time: Array  # (m,) since `origin` [s]
@@ -95,32 +95,32 @@ class StrokeFinding(Stroke):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PredictionFinding(TrialNumbers):
-    """The prediction of a trial in a report: its `stroke` is that stroke's number."""
+    """The prediction of a trial in a report: `stroke` is a number from 1."""
 
     experiment: str
     index: int | None
     code: str
-    responses: Mapping[str, Response]  # every quantity at the ending by its name; none where there is no prediction
+    responses: Mapping[str, Response]  # every quantity at the ending by its name; empty without a prediction
     history: History | None
     peak_rate: float | None = None  # of an SA-II afferent, an illustration [imp/s]
-    settled_rate: float | None = None  # likewise
-    peak_rate_interval: Ends | None = None  # that the interval of the SED makes of it, every parameter as given
-    settled_rate_interval: Ends | None = None  # likewise
+    settled_rate: float | None = None  # at long times [imp/s]
+    peak_rate_interval: Ends | None = None  # from the interval of the SED, with parameters as given
+    settled_rate_interval: Ends | None = None  # of the settled rate, from the same interval
     row: Mapping[float, float] = field(default_factory=dict[float, float])  # SED [MPa] by place along the skin [mm]
-    doubt: str = ""  # why no finger can be in the state of the model's numbers, as `Alternative.doubt`
-    opposite_doubt: str = ""  # likewise of the state slid the other way
+    doubt: str = ""  # why no finger can be in the predicted state, as in `Alternative.doubt`
+    opposite_doubt: str = ""  # the same for the opposite slide
 
 
 @dataclass(frozen=True, slots=True)
 class AnswerFinding:
-    """What the subject answered to a trial."""
+    """The subject's answer in a trial."""
 
     trial: int
     experiment: str
     index: int | None  # None while the session is blinded
     code: str
     outcome: Outcome
-    answer: float | Choice  # a score, a number of the subject's own, or which of two
+    answer: float | Choice  # a score, a number on the subject's own scale, or which of two
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,7 +135,7 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class GroundTruth:
-    """Friction and motion that a simulator set in one trial: for comparison only, no result uses them."""
+    """Friction and motion that a simulator set in one trial: for comparison only; no result uses them."""
 
     trial: int
     mu: float  # [-]
@@ -155,17 +155,17 @@ class Course:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
-    """Everything a reader needs; exports only lay it out."""
+    """The complete content; exports only lay it out."""
 
     title: str = ""
     session: str
-    head: str = ""  # first line of whatever is made of a simulated session; "" for a real one
+    head: str = ""  # first line of every document on a simulated session; "" for a real one
     sealed: str = ""  # whether predictions were sealed before scores
     versions: tuple[Fact, ...] = ()
     people: tuple[Fact, ...] = ()
     apparatus: tuple[Fact, ...] = ()
     excluded: tuple[str, ...] = ()
-    remarks: tuple[str, ...] = ()  # what is missing and nobody excluded, decisions on what counts, doubts about it
+    remarks: tuple[str, ...] = ()  # missing data, decisions on what counts, and doubts
     flaws: tuple[Fact, ...] = ()  # name, sentence, where
     experiments: tuple[Experiment, ...] = ()
     course: Course | None = None
@@ -176,18 +176,18 @@ class Report:
     ground_truth: tuple[GroundTruth, ...] = ()
     modelled: tuple[Fact, ...] = ()
     left_out: tuple[Fact, ...] = ()
-    reproduction: tuple[Fact, ...] = ()  # everything needed to do it again ...
+    reproduction: tuple[Fact, ...] = ()  # everything needed to repeat the analysis ...
     commands: tuple[str, ...] = ()  # ... and what to type
-    width: float | None  # of the finger [mm], where forces per mm met forces
+    width: float | None  # of the finger [mm], by which forces per mm are multiplied
     width_origin: str = ""  # "set" or "assumed"
-    other_signs: tuple[str, ...] = ()  # where the SED goes another way on this finger than on the published one
-    response: str = "sed"  # the quantity at the ending that is held against scores, one of `solver.quantities`
-    model: str = ""  # which model the SEDs are of, in a few words
-    interval_kind: str = ""  # what the intervals in `StrokeFinding.bootstrap` are
-    interval_kinds: dict[str, str] = field(default_factory=dict[str, str])  # what else they hold, by a number's name
-    scene: TextFile | None = None  # that the commands name, where another finger than the session's was asked for
+    other_signs: tuple[str, ...] = ()  # series with opposite slopes of the SED on this finger and the published one
+    response: str = "sed"  # the quantity at the ending that is compared with scores, one of `solver.quantities`
+    model: str = ""  # short description of the model
+    interval_kind: str = ""  # description of the intervals in `StrokeFinding.bootstrap`
+    interval_kinds: dict[str, str] = field(default_factory=dict[str, str])  # further descriptions, by a number's name
+    scene: TextFile | None = None  # named in the commands, where another finger than the session's was used
     afferent: tuple[Fact, ...] = ()  # every parameter of the afferent, where its rates are shown
-    afferent_quantity: str = "sed"  # what it answers to, one of `solver.quantities`
+    afferent_quantity: str = "sed"  # its driving quantity, one of `solver.quantities`
 
     @property
     def simulated(self) -> bool:

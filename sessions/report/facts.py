@@ -1,4 +1,4 @@
-"""Who and what, what was excluded, and everything needed to do it again, with what to type."""
+"""Participants, apparatus, exclusions, and all that is needed to repeat the analysis, with commands."""
 
 import hashlib
 import math
@@ -26,7 +26,7 @@ from sessions.toml_file import toml_text
 
 
 def versions() -> tuple[Fact, ...]:
-    """Return the versions that make a page."""
+    """Return the software versions of a page."""
     return tuple(Fact(name, version) for name, version in software_versions().items())
 
 
@@ -39,11 +39,11 @@ def session_commands(
     scores: Sequence[str] = (),
     response: str = SED.name,
 ) -> tuple[str, ...]:
-    """Return the commands, to be typed where the session folders lie; `scores` are the names of further visits."""
+    """Return the commands, for the folder of the sessions; `scores` are the names of further visits."""
     name = shlex.quote(recording.folder.name)
     settings = (*area_arguments(analysis.settings.area), *calibration_arguments(analysis.settings.gain_error))
     seed = analysis.settings.bootstrap_seed
-    seed_option = ["--bootstrap-seed", str(seed)] if seed else []  # later verbs read it from the first one's results
+    seed_option = ["--bootstrap-seed", str(seed)] if seed else []  # later verbs read it from the results of the first
     lines = [["verify", name], ["analyse", name, *settings, *seed_option]]
     report = ["report", name, "-o", "report.html"]
     if prediction is not None:
@@ -65,7 +65,7 @@ def session_commands(
 
 
 def scene_file(recording: Recording, prediction: SessionPrediction | None) -> TextFile | None:
-    """Return the scene file that gives the finger of a prediction; None where that is what the session itself gives."""
+    """Return the scene file with the finger of a prediction; None where the session itself defines that finger."""
     if prediction is None or prediction.options.scene is None:
         return None
     if with_own_finger(replace(prediction.options, scene=None), recording.plan) == prediction.options:
@@ -75,7 +75,7 @@ def scene_file(recording: Recording, prediction: SessionPrediction | None) -> Te
 
 
 def model_arguments(options: PredictionOptions) -> list[str]:
-    """Return what asks 'daq-app predict' for a model, but for its finger.
+    """Return the arguments of 'daq-app predict' for a model, without its finger.
 
     >>> model_arguments(PredictionOptions(kinematics="finite", indentation=1.0))
     ['--kinematics', 'finite', '--indentation', '1.0']
@@ -89,7 +89,7 @@ def model_arguments(options: PredictionOptions) -> list[str]:
 
 
 def area_arguments(law: AreaLaw) -> list[str]:
-    """Return what asks for a law of the contact area.
+    """Return the arguments for a law of the contact area.
 
     >>> area_arguments(AreaLaw("power", 0.5, 3.0))
     ['--area', '0.5', '--area-force', '3.0']
@@ -101,7 +101,7 @@ def area_arguments(law: AreaLaw) -> list[str]:
 
 
 def calibration_arguments(gain_error: float | None) -> list[str]:
-    """Return what asks for a calibration error, in per cent as the option takes it.
+    """Return the arguments for a calibration error, in per cent.
 
     >>> calibration_arguments(0.003)
     ['--calibration-error', '0.3']
@@ -127,7 +127,7 @@ _ORIGIN: dict[Origin, str] = {"measured": "measured", "set": "set", "default": "
 
 
 def people(recording: Recording, tables: Sequence[ScoreTable]) -> tuple[Fact, ...]:
-    """Return who took part, and what they were asked to do."""
+    """Return the participants and their tasks."""
     plan = recording.plan
     subjects = sorted({table.subject for table in tables if table.scores})
     facts = [Fact("subject", plan.subject)] if plan.subject else []
@@ -161,7 +161,7 @@ def _block(block: Block) -> str:
 
 
 def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
-    """Return what measured, how it was set, and what was done to its readings."""
+    """Return the apparatus, its settings and the processing of its readings."""
     info, plan = recording.info, recording.plan
     if info is None:
         return (Fact("transducer", "none: a visit for scores only"),)
@@ -187,7 +187,7 @@ def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
 
 
 def _tilt(analysis: Analysis) -> tuple[str, str]:
-    """Return the tilt of the face, empty where nobody stated it, and whether it was levelled."""
+    """Return the tilt of the face, "" where unknown, and whether it was levelled."""
     tilt, x_y = analysis.tilt, analysis.settings.tilt
     levelling = "not levelled" if x_y == (0.0, 0.0) else f"levelled by {x_y[0]:.2g}° and {x_y[1]:.2g}°"
     if tilt is None:
@@ -199,7 +199,7 @@ def _tilt(analysis: Analysis) -> tuple[str, str]:
 
 
 def exclusion_sentences(recording: Recording, analysis: Analysis, strokes: Sequence[StrokeFinding]) -> tuple[str, ...]:
-    """Return a sentence for each thing that is excluded from the results, with who decided it and why."""
+    """Return a sentence for each exclusion from the results, with its author and reason."""
     sentences = [full_stop(f"By {decision.sentence}") for decision in analysis.decisions if decision.leaves_out]
     for record in recording.trials:
         number = record.trial.number
@@ -217,7 +217,7 @@ def exclusion_sentences(recording: Recording, analysis: Analysis, strokes: Seque
 
 
 def remarks(recording: Recording, analysis: Analysis, tables: Sequence[ScoreTable]) -> tuple[str, ...]:
-    """Return what is missing though nobody excluded it, what people decided of what counts, and doubts about it."""
+    """Return sentences on missing data, decisions on what counts, and doubts."""
     sentences = [f"Lost: {loss}." for loss in recording.losses]
     sentences += [full_stop(f"By {decision.sentence}") for decision in analysis.decisions if not decision.leaves_out]
     sentences += [table.other_answers for table in tables if table.other_answers]
@@ -237,7 +237,7 @@ def remarks(recording: Recording, analysis: Analysis, tables: Sequence[ScoreTabl
 
 
 def reproduction_facts(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
-    """Return all that shaped the numbers; values nobody set are marked."""
+    """Return everything that influenced the numbers; defaults are marked."""
     provenance, info = recording.provenance, recording.info
     facts = [
         Fact("session folder", recording.folder.name),

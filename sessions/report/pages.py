@@ -49,11 +49,11 @@ def template(name: str, package: str = "sessions.report") -> Template:
 
 
 _DOCTYPE = "<!DOCTYPE html>"
-BODY = {"table-relation", "table-strokes", "table-predictions", "table-rivals"}  # all others stand in the appendix
+BODY = {"table-relation", "table-strokes", "table-predictions", "table-rivals"}  # all others are in the appendix
 
 
 class ReportError(Exception):
-    """A report that could not be written: where, why, what to do."""
+    """A report that could not be written; the message says where, why, and what to do."""
 
 
 def page(report: Report, drawings: Sequence[Plate] | None = None) -> str:
@@ -74,7 +74,7 @@ def page(report: Report, drawings: Sequence[Plate] | None = None) -> str:
 
 
 def _page(file: str, drawings: Iterable[Plate], notice: str, **values: object) -> str:
-    """Return a page of a template; figures and tables are numbered in the order in which they stand on it."""
+    """Return a page of a template; figures and tables are numbered in order of appearance."""
     return template(file).render(
         figures={plate.name: plate for plate in drawings},
         figure_number=count(1).__next__,
@@ -88,16 +88,16 @@ def _page(file: str, drawings: Iterable[Plate], notice: str, **values: object) -
 
 
 def write_report(report: Report, path: Path, drawings: Sequence[Plate] | None = None) -> None:
-    """Write the page to `path`: a new file, then swapped in, so that readers see the old page or the new one.
+    """Write the page to `path`: as a new file that replaces the old one, so that readers see either page whole.
 
-    Raises ReportError when that cannot be done, and NotOurs when `path` holds something that is no page.
+    Raises ReportError when writing fails, and NotOurs when `path` holds something other than a page.
     """
     check_place(path)
     swap_in(path, page(report, drawings))
 
 
 def check_place(path: Path, *companions: Path) -> None:
-    """Raise ReportError where a page has no place, and NotOurs where it or its companions would replace others'."""
+    """Raise ReportError where a page cannot be written, NotOurs where it or `companions` would replace other files."""
     make_place(path.parent)
     check_replaceable(path, _DOCTYPE, *companions)
 
@@ -110,7 +110,7 @@ def write_figures(report: Report, folder: Path, drawings: Sequence[Plate] | None
     files: dict[Path, str] = {}
     for plate in plates(report) if drawings is None else drawings:
         for panel in plate.panels:
-            name = re.sub(r"[^0-9A-Za-z_-]", "-", panel.name)  # one that any file system takes
+            name = re.sub(r"[^0-9A-Za-z_-]", "-", panel.name)  # valid in any file system
             picture, numbers = folder / f"{name}.svg", folder / f"{name}.csv"
             check_replaceable(picture, SVG_MARK, numbers)
             files |= {picture: panel.svg, numbers: panel_csv(panel, report.head)}
@@ -120,22 +120,22 @@ def write_figures(report: Report, folder: Path, drawings: Sequence[Plate] | None
 
 
 def embed(panel: Panel) -> Markup:
-    """Return the picture as it stands in a page: without the head an SVG file has."""
+    """Return the picture for a page, without the head of an SVG file."""
     return Markup(panel.svg[panel.svg.index("<svg") :])
 
 
 def text_address(text: str, media_type: str = "text/csv") -> str:
-    """Return an address that holds a text file, CSV unless another media type is given, so that a page stands alone."""
+    """Return a data address of a text file, by default CSV, which makes a page self-contained."""
     return f"data:{media_type};charset=utf-8;base64," + base64.b64encode(text.encode()).decode()
 
 
 def panel_csv(panel: Panel, notice: str) -> str:
-    """Return the numbers of a picture, empty where there is none; `notice` comes first where something is simulated."""
+    """Return the numbers of a picture, empty cells for missing ones; a `notice` of simulation comes first."""
     return (f"# {notice}\n" if notice else "") + _csv([panel.header, *panel.rows])
 
 
 def make_place(folder: Path) -> None:
-    """Make a folder where there is none. Raises ReportError, also where nothing can be written into it."""
+    """Make a folder unless it exists. Raises ReportError, also where it is not writable."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if not os.access(folder, os.W_OK):
@@ -155,7 +155,7 @@ def swap_in(path: Path, text: str) -> None:
         raise ReportError(f"{path} cannot be written ({error.strerror}): {advice}") from error
 
 
-# Tables that are no appendix; that of the trials stands under a heading of its own behind it.
+# Tables outside the appendix; the table of trials has its own heading after it.
 STUDY_BODY = {"table-relation", "table-scores", "table-surfaces", "table-rivals", "table-trials"}
 
 
@@ -181,8 +181,8 @@ def study_page(study: StudyFindings, name: str) -> str:
 
 
 _SIMULATED = "SIMULATED"
-TRIALS, TRIAL_COLUMNS = "trials.csv", "trials-columns.csv"  # as they lie beside the page
-_MEANING = meanings(TrialRow)  # of each column of the table of trials: all fields of a row but its paths
+TRIALS, TRIAL_COLUMNS = "trials.csv", "trials-columns.csv"  # next to the page
+_MEANING = meanings(TrialRow)  # of each column of the table of trials: all fields of a row except its paths
 _RESPONSES: Mapping[str, tuple[str, str]] = {
     quantity.name: (quantity.unit.strip("-"), f"of the model, averaged over the ending: {quantity.meaning}")
     for quantity in QUANTITIES
@@ -217,7 +217,7 @@ def paths_csv(study: StudyFindings) -> str:
 
 
 def rivals_csv(study: StudyFindings) -> str:
-    """Return a row for each quantity that may follow the scores, of means and within subjects, for R and pandas."""
+    """Return a row for each quantity correlated with scores, of means and within subjects, for R and pandas."""
     columns = [field.name for field in fields(Rival) if field.name not in ("contrast", "reasons")]
     contrast_columns = ["difference", "difference_low", "difference_high", "steiger_z", "p"]
     rows: list[list[object]] = [["descriptor", "kind", *columns, *contrast_columns]]
@@ -231,9 +231,9 @@ def rivals_csv(study: StudyFindings) -> str:
 
 
 def trials_csv(study: StudyFindings) -> str:
-    """Return a row for each trial of each visit: one header line, a point in decimals, empty where there is no number.
+    """Return a row for each trial of each visit: one header line, decimal points, empty cells for missing numbers.
 
-    R's read.csv and pandas' read_csv open it as it is. Of a simulated study the first column is called SIMULATED.
+    R's read.csv and pandas' read_csv open it directly. The first column of a simulated study is SIMULATED.
     """
     rows: list[list[object]] = [[heading(name, unit) for name, (unit, _) in _columns(study).items()]]
     copies = dict(study.copies)
@@ -249,7 +249,7 @@ def trials_csv(study: StudyFindings) -> str:
 
 
 def _csv(rows: Sequence[Sequence[object]], *, simulated: bool = False) -> str:
-    """Return rows as CSV; a first column says of each of a simulated study that it is."""
+    """Return rows as CSV; in a simulated study the first column marks each row."""
     if simulated:
         rows = [[_SIMULATED, *rows[0]], *(["yes", *row] for row in rows[1:])]
     buffer = io.StringIO()

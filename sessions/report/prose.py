@@ -1,4 +1,4 @@
-"""What a report says in sentences: its question, its answer in short, and what would change the sign of r."""
+"""Sentences of a report: its question, its summary, and conditions that would change the sign of r."""
 
 from collections.abc import Callable, Mapping
 from itertools import takewhile
@@ -25,13 +25,13 @@ from sessions.report.wording import (
 from sessions.statistics.correlations import Relation, relation
 from sessions.statistics.scores import by_key
 
-_REACH = 2.0  # of the places that are looked at, along the skin to both sides of the ending [mm]
+_REACH = 2.0  # of the places considered along the skin, on both sides of the ending [mm]
 OTHER_FINGERS = "On a finger of another size or stiffness the sign may differ; 'daq-app sensitivity' tries 900 of them."
 _NumberOf = Callable[[PredictionFinding], float | None]
 
 
 def doubts(report: Report) -> tuple[str, ...]:
-    """Return what would change the sign of r between prediction and scores; nothing where there is no r."""
+    """Return sentences on what would change the sign of r between prediction and scores; empty without an r."""
     if all(p.sed is None for p in report.predictions) or not report.scored:
         return ()
     strain: Literal["small", "finite"] = "small" if report.model.startswith("small") else "finite"
@@ -47,7 +47,7 @@ def doubts(report: Report) -> tuple[str, ...]:
 
 
 def _in_variant(report: Report, variant: Variant, condition: str) -> str:
-    """Return r of the scores with the SED in a variant, for each experiment."""
+    """Return a sentence with r of the scores and the SED in a variant, for each experiment."""
 
     def sed(prediction: PredictionFinding) -> float | None:
         return next((a.sed for a in prediction.alternatives if a.variant == variant), None)
@@ -67,7 +67,7 @@ def _in_variant(report: Report, variant: Variant, condition: str) -> str:
 
 
 def _relation(report: Report, experiment: Experiment, value: _NumberOf) -> Relation:
-    """Return how a number goes with mean scores, over the stimuli that have both; repetitions are averaged."""
+    """Return the relation of a number to mean scores, over the stimuli that have both; repetitions are averaged."""
     means = {mean.index: mean.mean for mean in experiment.scores}
     by_index = by_key(
         (p.index, number)
@@ -79,7 +79,7 @@ def _relation(report: Report, experiment: Experiment, value: _NumberOf) -> Relat
 
 
 def _by_place(report: Report) -> str:
-    """Return how far along the skin the ending may lie without another sign of r."""
+    """Return a sentence on the range of the ending along the skin without a change of the sign of r."""
     ranges: list[str] = []
     for experiment in report.experiments:
         rows = [p.row for p in report.predictions if p.experiment == experiment.name and p.row]
@@ -99,7 +99,7 @@ def _by_place(report: Report) -> str:
 
 
 def _alike(r_by_arc: Mapping[float, float]) -> tuple[float, float]:
-    """Return the ends of the stretch about 0 in which the sign is that at 0.
+    """Return the ends of the stretch about 0 with the sign at 0.
 
     >>> _alike({-0.5: -0.9, -0.25: 0.3, 0.0: 0.9, 0.25: 0.8})
     (-0.25, 0.25)
@@ -112,7 +112,7 @@ def _alike(r_by_arc: Mapping[float, float]) -> tuple[float, float]:
 
 
 def question(report: Report) -> str:
-    """Return what the session asks, as far as what it holds can answer it."""
+    """Return the session's question, as far as its data can answer it."""
     descriptors = " and ".join(dict.fromkeys(e.descriptor for e in report.experiments))
     if not report.experiments:
         return "What forces does this recording hold, where does something stroke the surface, and with what friction?"
@@ -131,7 +131,7 @@ def question(report: Report) -> str:
 
 
 def friction_question(quantity: str) -> str:
-    """Return what a session without scores asks; `quantity` is what the model predicts, "" for none."""
+    """Return the question of a session without scores; `quantity` is the model's prediction, "" for none."""
     model_clause = f", and what {quantity} does a finger model predict at a receptor" if quantity else ""
     return f"With what µ do they stroke them{model_clause}?"
 
@@ -172,7 +172,7 @@ def summary(report: Report) -> tuple[str, ...]:
 
 
 def distinctions(report: Report) -> tuple[str, ...]:
-    """Return what scores can and cannot tell apart."""
+    """Return sentences on the rivals that scores can and cannot distinguish."""
     return tuple(s for e in report.experiments if e.rivals for s in rivals_sentences(e.name, e.rivals))
 
 
@@ -189,7 +189,7 @@ def _strokes(report: Report) -> str:
 
 
 def _prediction_sentence(experiment: Experiment, quantity: ShownResponse, limits: Ends, strain: str) -> str:
-    """Return how prediction and score go together in one experiment; `limits` are in the shown unit."""
+    """Return a sentence on prediction and score in one experiment; `limits` are in the shown unit."""
     low, high = limits
     decimals, unit = (2, " kPa") if quantity.unit == "kPa" else (quantity.places, "")
     sentence = f"{capital(experiment.name)}: the {quantity.label} predicted{f' at {strain}' if strain else ''}"

@@ -1,4 +1,4 @@
-"""What a study's page says in sentences and facts: its answer in short, who, what was excluded, what made it."""
+"""Sentences and facts of a study's page: summary, participants, exclusions, reproduction."""
 
 import re
 import shlex
@@ -21,11 +21,11 @@ from sessions.statistics.multiverse import Kinematics
 from sessions.statistics.scores import by_key
 from sessions.statistics.visit import Exclusion
 
-_MOST_NAMED = 12  # trials named one by one
+_MOST_NAMED = 12  # names listed in full
 
 
 def question(study: StudyFindings) -> str:
-    """Return what the study asks."""
+    """Return the study's question."""
     quantity = shown_response(study.response).in_full
     if not any(findings.scores for findings in study.descriptors):
         forces = any(visit.forces for visit in study.visits)
@@ -62,7 +62,7 @@ def summary(study: StudyFindings) -> list[str]:
 
 
 def distinctions(study: StudyFindings) -> list[str]:
-    """Return what scores can and cannot tell apart."""
+    """Return sentences on the rivals that scores can and cannot distinguish."""
     return [
         sentence
         for findings in study.descriptors
@@ -92,7 +92,7 @@ def _relation_sentences(findings: DescriptorFindings, study: StudyFindings) -> l
 
 
 def _otherwise(findings: DescriptorFindings, other_strain: Kinematics) -> str:
-    """Return what the same trials give at the other strain, as far as the many paths went there."""
+    """Return a clause on the same trials at the other strain, from the paths if they include it."""
     usual = next((path.path for path in findings.paths if path.usual), None)
     other_path = None if usual is None else replace(usual, kinematics=other_strain)
     alternative = next((path for path in findings.paths if path.path == other_path), None)
@@ -108,7 +108,7 @@ def _otherwise(findings: DescriptorFindings, other_strain: Kinematics) -> str:
 
 
 def subject_facts(study: StudyFindings) -> list[Fact]:
-    """Return who took part."""
+    """Return the participants."""
     subjects = sorted({visit.subject for visit in study.visits})
     strokers = sorted({visit.subject for visit in study.visits if visit.forces})
     protocols = sorted({visit.protocol for visit in study.visits})
@@ -120,7 +120,7 @@ def subject_facts(study: StudyFindings) -> list[Fact]:
 
 
 def exclusion_sentences(study: StudyFindings) -> list[str]:
-    """Return a sentence for each thing that is excluded from the results, with who decided it and why."""
+    """Return a sentence for each exclusion from the results, with its author and reason."""
     sentences = [f"Session {name} could not be read, and nothing of it counts: {text}." for name, text in study.failed]
     sentences += [
         f"Session {session} holds the same recording as {first}, to the last reading and event, and counts nothing."
@@ -135,7 +135,7 @@ def exclusion_sentences(study: StudyFindings) -> list[str]:
 
 
 def _decision_sentences(study: StudyFindings, *, leaving_out: bool) -> list[str]:
-    """Return the decisions about strokes that leave one out, or all others."""
+    """Return the decisions that leave a stroke out, or all other decisions."""
     decisions = [(visit.session, decision) for visit in study.visits for decision in visit.decisions]
     return [f"Session {name}: {full_stop(s)}" for name, s in decisions if (" is left out: " in s) == leaving_out]
 
@@ -144,7 +144,7 @@ NO_TRIAL = "has no trial of an experiment, as an imported table has none, and co
 
 
 def remarks(study: StudyFindings) -> list[str]:
-    """Return what is missing though nobody excluded it, what people decided of what counts, and doubts about it."""
+    """Return sentences on missing data, decisions on what counts, and doubts."""
     sentences = _decision_sentences(study, leaving_out=False)
     sentences += [
         f"Session {visit.session} {'ended before its last trial; what it holds counts' if visit.rows else NO_TRIAL}."
@@ -183,7 +183,7 @@ def remarks(study: StudyFindings) -> list[str]:
 
 
 def _meshes(study: StudyFindings) -> list[str]:
-    """Return what it makes of the SEDs that sessions were not all solved on one mesh; nothing where they were."""
+    """Return a sentence on the effect of different meshes on the SEDs; empty if all sessions share one."""
     meshes = by_key((value, v.session) for v in study.visits for name, value, _ in v.model if name == UNKNOWNS)
     errors = [row.error_estimate for visit in study.visits for row in visit.rows if row.error_estimate is not None]
     if len(meshes) < 2 or not errors:
@@ -198,7 +198,7 @@ def _meshes(study: StudyFindings) -> list[str]:
         surface.response.sd / surface.response.mean
         for findings in study.descriptors
         for surface in findings.surfaces
-        if surface.response is not None and surface.response.sd and study.response == SED.name  # whose errors these are
+        if surface.response is not None and surface.response.sd and study.response == SED.name  # errors are of the SED
     ]
     if spreads:
         sentence += (
@@ -217,13 +217,13 @@ def _trials_of(exclusion: Exclusion) -> str:
 
 
 def _fits(study: StudyFindings, exclusion: Exclusion) -> bool:
-    """Say whether some session has a trial that a decision leaves out."""
+    """Say whether any session has a trial that a decision leaves out."""
     rows = chain.from_iterable(visit.rows for visit in study.visits if visit.subject == exclusion.subject)
     return any(exclusion.descriptor in ("", row.descriptor) for row in rows)
 
 
 def _trials_without_sed(study: StudyFindings) -> list[str]:
-    """Return which trials that were done have no SED, and why, those that differ in numbers alone together."""
+    """Return sentences on completed trials without an SED; reasons that differ only in numbers are merged."""
     sentences: list[str] = []
     alike = by_key(
         (re.sub(r"[\d.]+", "#", row.why), (f"{visit.session} trial {row.trial}", row.why))
@@ -244,7 +244,7 @@ def _first_few(names: Sequence[str]) -> str:
 
 
 def seal_sentence(study: StudyFindings) -> str:
-    """Return whether predictions were sealed before scores."""
+    """Return a sentence on whether predictions were sealed before scores."""
     alike = by_key((visit.sealed, visit.session) for visit in study.visits if visit.sealed)
     if len(alike) == 1:
         ((sentence, sessions),) = alike.items()
@@ -253,7 +253,7 @@ def seal_sentence(study: StudyFindings) -> str:
 
 
 def model_facts(study: StudyFindings) -> list[Fact]:
-    """Return the facts about the model; where sessions differ, each value with the first few that have it."""
+    """Return the facts about the model; where sessions differ, each value with the first few sessions."""
     effects = by_key((name, (fact, visit.session)) for visit in study.visits for name, *fact in visit.model)
     facts: list[Fact] = []
     for name, pairs in effects.items():
@@ -265,7 +265,7 @@ def model_facts(study: StudyFindings) -> list[Fact]:
 
 
 def reproduction_facts(study: StudyFindings) -> list[Fact]:
-    """Return what the numbers were made with: options, versions, and the hash of each recording."""
+    """Return the facts for reproduction: options, versions, and the hash of each recording."""
     model = study.options.prediction
     facts = [
         Fact("strain of the model", model.kinematics),
@@ -281,7 +281,7 @@ def reproduction_facts(study: StudyFindings) -> list[Fact]:
 
 
 def command(study: StudyFindings, name: str) -> str:
-    """Return what to type to get the same numbers, where the study's folder lies or is to be made."""
+    """Return the command that reproduces the numbers, run in the parent of the study's folder."""
     options = study.options
     model = options.prediction
     usual = model.kinematics == "small"  # see 'daq-app study --intervals'

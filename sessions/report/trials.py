@@ -1,4 +1,4 @@
-"""What the analysis and the model say of each stroke and trial: numbers, courses, flaws, pictures of the finger."""
+"""Results of each stroke and trial for a report: numbers, time courses, flaws, pictures of the finger."""
 
 import itertools
 import re
@@ -31,13 +31,13 @@ from sessions.strokes.bootstrap import NUMBERS
 from sessions.strokes.forces import in_face_frame
 from sessions.strokes.stroke import AreaLaw, Flaw, Stroke
 
-MOST_INSTANTS = 600  # of a stroke's course that a picture can show
-_GAP = 5.0  # usual steps in time [-]; a longer one may show that readings are missing
-STRETCHES = 700  # of the whole recording, each drawn by its least and its greatest value
+MOST_INSTANTS = 600  # most instants of a stroke in a picture
+_GAP = 5.0  # multiple of the usual time step [-]; a longer step may be a gap
+STRETCHES = 700  # stretches of the whole recording, each drawn by its extremes
 
 
 def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ...]:
-    """Return the strokes, numbered in order of time, with what their trials ask for."""
+    """Return the strokes, numbered in order of time, with data of their trials."""
     trials = {trial.number: trial for trial in recording.plan.trials}
     findings: list[StrokeFinding] = []
     for position, stroke in enumerate(analysis.strokes):
@@ -60,7 +60,7 @@ def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ..
 
 
 def answers(recording: Recording) -> tuple[AnswerFinding, ...]:
-    """Return what the subject answered to each trial, in their order."""
+    """Return the subject's answer in each trial, in order."""
     return tuple(
         AnswerFinding(t.number, t.block, t.stimulus.index, t.stimulus.code, record.outcome, record.answer)
         for record in recording.trials
@@ -70,7 +70,7 @@ def answers(recording: Recording) -> tuple[AnswerFinding, ...]:
 
 
 def flaws(analysis: Analysis) -> tuple[Fact, ...]:
-    """Return every flaw with its sentence, its grade and where it lies."""
+    """Return every flaw with its sentence, its grade and its place."""
 
     def location(flaw: Flaw) -> str:
         if flaw.stroke is not None:
@@ -81,9 +81,9 @@ def flaws(analysis: Analysis) -> tuple[Fact, ...]:
 
 
 def course(recording: Recording) -> Course | None:
-    """Return the forces over the whole recording, no zero taken off and unfiltered; None where there are none.
+    """Return the forces over the whole recording, without zeroing and unfiltered; None without forces.
 
-    Readings missing for longer than a stretch of the picture break its curves: no line is drawn across.
+    Gaps longer than a stretch of the picture break its curves.
     """
     if recording.info is None:
         return None
@@ -102,7 +102,7 @@ def course(recording: Recording) -> Course | None:
 
 
 def _reasons(stroke: Stroke, position: int, flaws: tuple[Flaw, ...]) -> dict[str, str]:
-    """Return a sentence for every number withheld, by its name."""
+    """Return a sentence for every withheld number, by name."""
     sentences = {str(flaw.name): flaw.sentence for flaw in flaws if flaw.stroke == position}
     reasons = {number: sentences.get(name, name.replace("_", " ")) for number, name in stroke.reasons.items()}
     usual = {
@@ -115,7 +115,7 @@ def _reasons(stroke: Stroke, position: int, flaws: tuple[Flaw, ...]) -> dict[str
 
 
 def _trace(stroke: Stroke) -> Trace | None:
-    """Return the course of a stroke from its onset on, thinned evenly where it has too many readings to draw."""
+    """Return the course of a stroke from its onset on, thinned evenly to at most `MOST_INSTANTS` readings."""
     curve = stroke.curve
     if curve is None or not len(curve.time):
         return None
@@ -130,7 +130,7 @@ def _trace(stroke: Stroke) -> Trace | None:
 
 
 def _extremes(values: Array) -> Indices:
-    """Return positions of the least and the greatest value of each stretch of time, rising, both ends among them.
+    """Return the sorted positions of the least and greatest value of each stretch, including both ends.
 
     >>> _extremes(np.array([1.0, 5.0, 2.0])).tolist()
     [0, 1, 2]
@@ -154,7 +154,7 @@ _FROM_ROW = {"tau_max": "mu", "error_estimate": "sed", "normal_per_mm": "normal_
 def predictions(
     prediction: SessionPrediction | None, firings: Sequence[Firing] = (), undone: Set[int] = frozenset()
 ) -> tuple[PredictionFinding, ...]:
-    """Return a finding for each trial, or stroke where there are none; the session did not come to trials `undone`."""
+    """Return a finding for each trial, or stroke without trials; `undone` trials were not reached."""
     if prediction is None:
         return ()
     rates = {firing.trial: firing for firing in firings}
@@ -166,7 +166,7 @@ def predictions(
 
 
 def afferent_facts(settings: AfferentSettings, reference: float | None) -> tuple[Fact, ...]:
-    """Return every parameter of the afferent with its value, and what it rests on."""
+    """Return every parameter of the afferent with its value, and basis."""
     facts = [
         Fact(
             parameter["name"].replace("_", " "),
@@ -194,7 +194,7 @@ def fields(prediction: SessionPrediction | None) -> tuple[Field, ...]:
 
 
 def model_in_short(options: PredictionOptions, area: AreaLaw) -> str:
-    """Return in a few words which model SEDs are of.
+    """Return a short description of the model of the SEDs.
 
     >>> model_in_short(PredictionOptions(), AreaLaw())
     'small strain, settled sliding, τ max computed, contact area fixed'
@@ -203,11 +203,11 @@ def model_in_short(options: PredictionOptions, area: AreaLaw) -> str:
 
 
 def omissions(session: SessionPrediction | None) -> tuple[Fact, ...]:
-    """Return the effects that the model omits, how much each may change the SED, and how that was estimated."""
+    """Return the effects omitted by the model, the estimated change of the SED by each, and the method."""
     rows = () if session is None else session.trials
     solutions = [row.prediction for row in rows if row.prediction is not None]
     by_effect = by_key(effect for prediction in solutions for effect in prediction.model.get("left_out", {}).items())
-    # Sentences that differ in their numbers only stand together.
+    # Sentences that differ only in their numbers are grouped.
     sentences = (sentence for prediction in solutions for sentence in prediction.warnings)
     warnings = by_key((_NUMBER.sub("#", sentence), sentence) for sentence in sentences)
     return (
@@ -253,12 +253,12 @@ def _row(row: TrialPrediction) -> dict[float, float]:
 
 
 def field_of(experiment: str, row: TrialPrediction) -> Field | None:
-    """Return the settled finger of a trial; None where there is no prediction."""
+    """Return the settled finger of a trial; None without a prediction."""
     picture, stimulus = row.picture(), row.stimulus
     return None if picture is None or stimulus is None else Field(experiment, stimulus.known_index, *picture)
 
 
-NO_ESTIMATE = "no estimate"  # of what leaving an effect out changes
+NO_ESTIMATE = "no estimate"  # of the change by an omitted effect
 
 
 def _share(entries: Sequence[Mapping[str, Any]]) -> str:
@@ -271,7 +271,7 @@ def _share(entries: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _plain(value: float) -> str:
-    """Return a share in two figures without powers of ten, however small.
+    """Return a percentage with two figures, never with an exponent.
 
     >>> _plain(158.38), _plain(0.126), _plain(8e-6)
     ('158', '0.13', 'below 0.01')

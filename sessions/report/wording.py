@@ -1,4 +1,4 @@
-"""Numbers, names and quantities at the ending as people read them, and the captions in `captions.toml`."""
+"""Numbers, names and quantities at the ending for people, and the captions in `captions.toml`."""
 
 import math
 import re
@@ -20,12 +20,12 @@ _CAPTIONS: Mapping[str, str] = tomllib.loads((Path(__file__).parent / "captions.
 
 
 def caption(name: str, **words: object) -> str:
-    """Return the caption of a table or figure, with `words` in their places."""
+    """Return the caption of a table or figure, with `words` in its placeholders."""
     return _CAPTIONS[name].format(**words)
 
 
 def with_error(value: float, error: float | None, least: int) -> str:
-    """Return a number and its error with as many decimals as give the error one figure, `least` of them at least.
+    """Return a number and its error with enough decimals for one figure of the error, and at least `least`.
 
     >>> with_error(0.27982, 0.00031, 3), with_error(21.4, 0.42, 1), with_error(21.4, None, 1)
     ('0.2798 ± 0.0003', '21.4 ± 0.4', '21.4')
@@ -37,9 +37,9 @@ def with_error(value: float, error: float | None, least: int) -> str:
 
 
 def between(low: float, high: float, as_text: Callable[[float], str], unit: float = 1.0) -> str:
-    """Return a range as `as_text` writes its ends, with more decimals where they would read alike.
+    """Return a range with ends written by `as_text`, with more decimals where they would look equal.
 
-    `unit` is what `as_text` multiplies a number by first.
+    `as_text` first multiplies a number by `unit`.
 
     >>> between(0.5, 1.25, places(1)), between(-178.12, -178.09, places(0)), between(2.0, 2.0, places(1))
     ('0.5 to 1.2', '−178.12 to −178.09', '2.0 to 2.0')
@@ -51,7 +51,7 @@ def between(low: float, high: float, as_text: Callable[[float], str], unit: floa
 
 
 def finer(low: float, high: float, as_text: Callable[[float], str], unit: float = 1.0) -> Callable[[float], str]:
-    """Return `as_text`, or what shows as many decimals as tell the ends of a range apart.
+    """Return `as_text`, or a format with enough decimals to distinguish the ends of a range.
 
     >>> finer(0.001, 0.003, correlation)(0.0021)
     '+0.002'
@@ -64,7 +64,7 @@ def finer(low: float, high: float, as_text: Callable[[float], str], unit: float 
 
 
 def places(n: int) -> Callable[[float], str]:
-    """Return what shows a number with n decimals.
+    """Return a format with n decimals.
 
     >>> places(1)(2.25)
     '2.2'
@@ -94,7 +94,7 @@ def tau(megapascal: float) -> str:
 
 
 def correlation(r: float) -> str:
-    """Return a coefficient with two decimals, or as many more as it takes not to look perfect.
+    """Return a coefficient with two decimals, or more if it would look perfect.
 
     >>> correlation(-0.5), correlation(0.997), correlation(-0.99996), correlation(-0.004), correlation(1.0)
     ('−0.50', '+0.997', '−0.99996', '+0.00', '+1.00')
@@ -105,7 +105,7 @@ def correlation(r: float) -> str:
 
 
 def ends_of(relation: Relation) -> str:
-    """Return the 95 % interval of a correlation as the end of a sentence, "" where there is none."""
+    """Return the 95 % interval of a correlation as the end of a sentence, "" without one."""
     if relation.low is None or relation.high is None:
         return ""
     return f", 95 % interval {correlation(relation.low)} to {correlation(relation.high)}"
@@ -140,7 +140,7 @@ def plural(n: int, noun: str, several: str = "") -> str:
 
 
 def capital(text: str) -> str:
-    """Return words as they begin a sentence."""
+    """Return a text with a capital first letter."""
     return text[:1].upper() + text[1:]
 
 
@@ -150,7 +150,7 @@ def full_stop(sentence: str) -> str:
 
 
 def identifier(name: str) -> str:
-    """Return a different XML identifier for each name: what an identifier may not hold stands as its code point.
+    """Return a different XML identifier for each name: other characters become their code points.
 
     >>> identifier('relation a"b')
     'relation_20_a_22_b'
@@ -159,7 +159,7 @@ def identifier(name: str) -> str:
 
 
 def p_value(p: float) -> str:
-    """Return a p value as people write it.
+    """Return a p value for people.
 
     >>> p_value(0.0321), p_value(1e-9)
     ('0.032', '< 0.001')
@@ -174,19 +174,19 @@ def three_figures(value: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ShownResponse:
-    """One of `solver.quantities` as pages and figures show it."""
+    """One of `solver.quantities` in pages and figures."""
 
     name: str
     label: str
     kept_unit: str  # of the numbers in files: "MPa", or "-" for a strain
     unit: str  # of the numbers shown: "kPa", or "1"
-    factor: float  # a number shown by one kept
-    places: int  # decimals of a number shown
-    step: str  # unit of a slope on scores or indices, which is a millionth of the kept one
+    factor: float  # ratio of shown to stored numbers
+    places: int  # decimals of a shown number
+    step: str  # unit of a slope on scores or indices, a millionth of the stored unit
 
     @property
     def in_full(self) -> str:
-        """The label, an abbreviation with what it stands for."""
+        """The label, with abbreviations spelt out."""
         return "strain-energy density (SED)" if self.name == SED.name else self.label
 
     def text(self, number: float) -> str:
@@ -198,7 +198,7 @@ class ShownResponse:
         return digits(number, self.places) + ("" if self.unit == "1" else f" {self.unit}")
 
     def numbers(self, prediction: PredictionFinding) -> Numbers | None:
-        """Return a prediction's number in the kept unit, and its error where it has one; None without one."""
+        """Return a prediction's number in the stored unit, and its error if known; None without a number."""
         if self.name == SED.name:
             error = prediction.error_estimate
             if prediction.sed is None:
@@ -210,7 +210,7 @@ class ShownResponse:
         return (value, error) if math.isfinite(error) else (value,)
 
     def interval(self, prediction: PredictionFinding) -> Ends | None:
-        """Return the 95 % interval that friction makes of a prediction, in the kept unit; None where there is none."""
+        """Return the 95 % interval of a prediction from friction, in the stored unit; None without one."""
         sed_interval = prediction.interval
         if self.name != SED.name or sed_interval is None or prediction.doubt:
             return None
@@ -218,7 +218,7 @@ class ShownResponse:
 
 
 def shown_response(name: str) -> ShownResponse:
-    """Return how texts describe the quantity of that name; the names are those of `solver.quantities`."""
+    """Return the description of a quantity by its name in `solver.quantities`."""
     quantity = BY_NAME[name]
     unit, factor = quantity.shown_unit
     places, step = (3, "Pa") if unit == "kPa" else (4, "10⁻⁶")

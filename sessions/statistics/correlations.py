@@ -1,4 +1,4 @@
-"""Correlations with their intervals, of one variable with two others compared, and given a third variable."""
+"""Correlations with intervals, their differences, and partial correlations."""
 
 import itertools
 import math
@@ -14,10 +14,10 @@ from drivers.arrays import Array
 CONFIDENCE = 0.95
 TAILS = ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2)  # probabilities of the ends of an interval
 LEAST_CASES = 3  # of a jackknife
-_EXACT_UP_TO = 7  # 7! = 5040 orders are counted one by one
+_EXACT_UP_TO = 7  # 7! = 5040 orders are enumerated
 
-POWER = 0.8  # with which a study should distinguish two correlations (Cohen 1988, p. 56)
-_PERFECT = 1.0 - 1e-12  # Fisher's z has no value at 1
+POWER = 0.8  # required to distinguish two correlations (Cohen 1988, p. 56)
+_PERFECT = 1.0 - 1e-12  # Fisher's z is infinite at 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class Relation:
     spearman: float | None = None
     spearman_low: float | None = None  # 95 % interval of spearman (Fisher's z, its error by Bonett & Wright 2000)
     spearman_high: float | None = None
-    spearman_p: float | None = None  # exact, two-sided: the share of all orders at least as far from 0
+    spearman_p: float | None = None  # exact, two-sided: the share of orders whose rho is at least as far from 0
     slope: float | None = None  # least-squares line y = intercept + slope x
     intercept: float | None = None
     without: tuple[tuple[int, float | None], ...] = ()  # (label, pearson over the others) for each stimulus left out
@@ -39,9 +39,9 @@ class Relation:
 
 
 def relation(x: Sequence[float], y: Sequence[float], labels: Sequence[int]) -> Relation:
-    """Return the relation of y to x; `labels` name the points (their stimulus' index).
+    """Return the relation of y to x; `labels` are the indices of the stimuli.
 
-    Pearson's r with its 95 % interval by Fisher's z, which takes four points and |r| < 1; Spearman's rho with its
+    Pearson's r with its 95 % interval by Fisher's z, which requires four points and |r| < 1; Spearman's rho with its
     exact p up to seven points; the least-squares line of y on x.
     """
     n = len(x)
@@ -60,7 +60,7 @@ def relation(x: Sequence[float], y: Sequence[float], labels: Sequence[int]) -> R
 
 
 def slope_interval(line: Relation) -> tuple[float, float] | None:
-    """Return the 95 % t interval of the slope (n - 2 degrees of freedom); None without one, or where r is 0 or 1.
+    """Return the 95 % t interval of the slope (n - 2 degrees of freedom); None without a slope, or where r is 0 or ±1.
 
     Its standard error follows from r: (slope / r) sqrt((1 - r^2) / (n - 2)).
     """
@@ -72,7 +72,7 @@ def slope_interval(line: Relation) -> tuple[float, float] | None:
 
 
 def t_quantile(dof: float) -> float:
-    """Return how many standard errors a 95 % t interval reaches to each side; of a normal law where `dof` is inf.
+    """Return the half-width of a 95 % t interval in standard errors; of the normal law where `dof` is inf.
 
     >>> round(t_quantile(9), 3), round(t_quantile(math.inf), 3)
     (2.262, 1.96)
@@ -81,10 +81,10 @@ def t_quantile(dof: float) -> float:
 
 
 def jackknife(estimate: ArrayLike, replicates: Array) -> tuple[Array, Array, Array]:
-    """Return the ends of the 95 % interval of `estimate` (m,), and p (m,).
+    """Return both ends of the 95 % interval of `estimate` (m,), and p (m,).
 
     `replicates` (k, m) are the estimates without each of the k cases. The mean of the pseudo-values follows Student's
-    t with k - 1 degrees of freedom (Tukey; Miller 1974, Biometrika 61:1). Cases that are all alike give nan.
+    t with k - 1 degrees of freedom (Tukey; Miller 1974, Biometrika 61:1). Identical cases give nan.
     """
     cases = len(replicates)
     pseudo = cases * np.asarray(estimate, np.float64) - (cases - 1) * replicates
@@ -107,7 +107,7 @@ def spearman(x: Sequence[float], y: Sequence[float]) -> float | None:
 
 
 def fisher_interval(r: float, n: int, inflation: float = 1.0) -> tuple[float | None, float | None]:
-    """Return the 95 % interval of a correlation by Fisher's z, its variance `inflated`.
+    """Return the 95 % interval of a correlation by Fisher's z, its variance times `inflation`.
 
     None for fewer than four points, or for a perfect correlation of either sign.
     """
@@ -123,7 +123,7 @@ def _varies(values: Sequence[float]) -> bool:
 
 
 def _ranks(values: Sequence[float]) -> Array:
-    """Return the ranks from 1 on, the same for values equal but for round-off: the middle of those they share.
+    """Return ranks from 1; values equal within round-off share their mean rank.
 
     >>> _ranks([3.0, 1.0, 3.0])
     array([2.5, 1. , 2.5])
@@ -134,7 +134,7 @@ def _ranks(values: Sequence[float]) -> Array:
 
 
 def _exact_p(x: Sequence[float], y: Sequence[float], rho: float) -> float | None:
-    """Return the share of all orders of y whose |rho| is at least |rho|; None where they are too many to count."""
+    """Return the share of all orders of y whose |rho| is at least |rho|; None for more than seven points."""
     n = len(x)
     if n > _EXACT_UP_TO:
         return None
@@ -146,21 +146,21 @@ def _exact_p(x: Sequence[float], y: Sequence[float], rho: float) -> float | None
 
 @dataclass(frozen=True, slots=True)
 class Contrast:
-    """How much more closely one variable follows the scores than a rival, each turned so that its r is positive."""
+    """The difference of two correlations with scores, each variable signed so that its r is positive."""
 
     n: int  # cases that have all three; within subjects, trials
     difference: float  # of the two correlations
     low: float | None  # its 95 % interval
     high: float | None
     z: float | None  # Steiger's; None where the interval is the jackknife's
-    p: float | None  # two-sided; None of cases that are all alike
+    p: float | None  # two-sided; None for identical cases
 
 
 def steiger_z(first: float, second: float, mutual: float, n: int) -> float | None:
-    """Return Steiger's Z of two correlations with one variable; `mutual` is that of the other two with each other.
+    """Return Steiger's Z of two correlations with one variable; `mutual` is the correlation of the other two.
 
     Steiger 1980 (Psychol. Bull. 87:245), equation 14 with pooled correlations. None for fewer than four cases, a
-    perfect correlation, or two variables that are the same but for scale.
+    perfect correlation, or two variables equal up to scale.
     """
     error = _pooled_variance(first, second, mutual)
     if n < 4 or error is None:
@@ -169,9 +169,9 @@ def steiger_z(first: float, second: float, mutual: float, n: int) -> float | Non
 
 
 def required_cases(first: float, second: float, mutual: float) -> int | None:
-    """Return how many cases Steiger's test needs to distinguish these correlations at p < 0.05 with `POWER`.
+    """Return the number of cases for Steiger's test to distinguish these correlations at p < 0.05 with `POWER`.
 
-    None where no number of cases would: the correlations are equal, or the test has no value.
+    None where no number suffices: the correlations are equal, or the test has no value.
     """
     error = _pooled_variance(first, second, mutual)
     if error is None or abs(first - second) < 1e-9:
@@ -183,7 +183,7 @@ def required_cases(first: float, second: float, mutual: float) -> int | None:
 def contrast(first: float, second: float, mutual: float, n: int) -> Contrast | None:
     """Return the difference of two correlations with Zou's interval (2007, Psychol. Methods 12:399) and Steiger's Z.
 
-    Correlations as for `steiger_z`, which says when there is none; a negative one is turned round with its variable.
+    Correlations, and cases of None, are those of `steiger_z`; a negative one changes sign with its variable.
     """
     first, second, mutual = abs(first), abs(second), math.copysign(1.0, first * second) * mutual
     z = steiger_z(first, second, mutual, n)
@@ -212,9 +212,9 @@ def partial_correlation(xy: ArrayLike, xz: ArrayLike, yz: ArrayLike) -> Array:
 
 
 def leave_one_out_error(x: Sequence[float], y: Sequence[float]) -> float | None:
-    """Return the root mean square error of each y by the least-squares line on x through the others [unit of y].
+    """Return the root mean square error of each y predicted by the least-squares line of the others [unit of y].
 
-    The residual over 1 less its leverage (Allen 1974, Technometrics 16:125). None where the others fix no line.
+    An error is the residual over 1 - leverage (Allen 1974, Technometrics 16:125). None where no line is determined.
     """
     if len(x) < 3:
         return None
@@ -231,7 +231,7 @@ def leave_one_out_error(x: Sequence[float], y: Sequence[float]) -> float | None:
 
 
 def _pooled_variance(first: float, second: float, mutual: float) -> float | None:
-    """Return n - 3 times the variance of the difference of two Fisher's z; None where there is no such difference."""
+    """Return n - 3 times the variance of the difference of two Fisher's z; None where it is undefined."""
     if max(abs(first), abs(second), abs(mutual)) > _PERFECT:
         return None
     pooled = (first + second) / 2

@@ -1,4 +1,4 @@
-"""What a study finds, as plain data, and how a simulated one recovers its ground truth."""
+"""Findings of a study as plain data, and recovery of the ground truth of a simulated study."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -46,17 +46,17 @@ UNITS = {
 
 @dataclass(frozen=True, slots=True)
 class Estimates:
-    """Magnitude estimates, each subject with a scale of its own."""
+    """Magnitude estimates, each subject on its own scale."""
 
-    geometric: Mapping[int, Average]  # by index: of the logarithms, as they were given
-    equal_moduli: Mapping[int, Average]  # likewise, brought to one modulus
+    geometric: Mapping[int, Average]  # by index: of the logarithms
+    equal_moduli: Mapping[int, Average]  # the same, scaled to one modulus
     repeated: RepeatedCorrelation | None  # of a subject's log estimates with the responses to its own strokes
     left_out: tuple[str, ...]  # subjects who gave an estimate that is not above 0
 
 
 @dataclass(frozen=True, slots=True)
 class ConstantStimuli:
-    """What comparisons with a standard say."""
+    """Results of comparisons with a standard."""
 
     functions: Mapping[str, Psychometric]  # of each subject
     pse: Average | None  # of its logarithm, over subjects who have one
@@ -74,12 +74,12 @@ class NormalisedScores:
 
 @dataclass(frozen=True, slots=True)
 class SurfaceMean:
-    """Means over subjects of one surface; None where there is no subject's number."""
+    """Means over subjects of one surface; None without a number of any subject."""
 
     index: int
     subjects: int  # whose stroke gave a response
     mu: Average | None
-    response: Average | None  # the quantity of the model that is held against scores [MPa or -]
+    response: Average | None  # the model's quantity that is compared with scores [MPa or -]
     normal_force: Average | None  # measured [N]
     model_normal_force: Average | None  # of the model, pressed to its depth [N]
     matching_depth: Average | None  # at which the model would press as hard as the subject did [mm]
@@ -87,7 +87,7 @@ class SurfaceMean:
 
 @dataclass(frozen=True, slots=True)
 class DescriptorFindings:
-    """All that a study says of one descriptor."""
+    """Findings of a study about one descriptor."""
 
     descriptor: str
     indices: tuple[int, ...]
@@ -96,26 +96,26 @@ class DescriptorFindings:
     agreement: Agreement | None
     surfaces: tuple[SurfaceMean, ...]
     answers: Mapping[str, tuple[float | None, ...]]  # subject -> score of each index
-    points: tuple[tuple[str, int, float, float], ...]  # subject, index, response, score: all of its own strokes
+    points: tuple[tuple[str, int, float, float], ...]  # subject, index, response to its own stroke, score
     mean_relation: Relation | None  # mean response against mean score
     repeated: RepeatedCorrelation | None  # of a subject's scores with the responses to its own strokes
-    repeated_holm: float | None  # its p, allowing for as many descriptors as have one
-    rivals: tuple[Rival, ...]  # within subjects: the response, and what else follows a subject's scores
-    rivals_of_means: tuple[Rival, ...]  # likewise of the means over subjects
-    without_subject: tuple[tuple[str, float], ...]  # subject left out, r within the others
+    repeated_holm: float | None  # its p, adjusted for the number of descriptors
+    rivals: tuple[Rival, ...]  # within subjects: the response and its rivals
+    rivals_of_means: tuple[Rival, ...]  # the same for means over subjects
+    without_subject: tuple[tuple[str, float], ...]  # subject left out, r within the other subjects
     normalised: NormalisedScores
     differences: tuple[Difference, ...]
     estimates: Estimates | None
-    exponent: Exponent | None  # of magnitude estimates by the µ that the model got; None where nobody gave any
-    scales: tuple[PairedScale, ...]  # of choices between two, by both models; () where nobody chose
-    consistence: Mapping[str, Consistence]  # of each subject who chose in every pair
-    # Score on the response as people read it [kPa or 1], drift and carry-over; or why there is no model
+    exponent: Exponent | None  # of magnitude estimates on the µ of the model; None without estimates
+    scales: tuple[PairedScale, ...]  # of choices between two, by both models; () without choices
+    consistence: Mapping[str, Consistence]  # of each subject who compared every pair
+    # Score on the response in its shown unit [kPa or 1], drift and carry-over; or why there is no model
     on_response: MixedModel | str
     on_index: MixedModel | str  # score on the maker's index, drift and carry-over
     on_friction: MixedModel | str  # score on the index and on the µ of each subject's own stroke, drift and carry-over
-    fingers: Spread | None  # how fingers differ: of the logarithm of mu between subjects, surfaces taken away [-]
-    paths: tuple[PathFinding, ...]  # () where they were not asked for
-    constant_stimuli: ConstantStimuli | None = None  # None where nobody compared with a standard
+    fingers: Spread | None  # spread of the logarithm of mu between subjects, without surface effects [-]
+    paths: tuple[PathFinding, ...]  # () where not requested
+    constant_stimuli: ConstantStimuli | None = None  # None without such comparisons
     latent: Mapping[Judgement, Mapping[int, IntervalEstimate]] = field(
         default_factory=dict[Judgement, Mapping[int, IntervalEstimate]]
     )
@@ -139,18 +139,18 @@ class EffectRecovery(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class FrictionRecovery:
-    """How well the mu of all strokes was estimated."""
+    """Recovery of the mu of all strokes."""
 
     strokes: int  # with a true and an estimated mu
     median_error: float  # of mu, relative [-]
     worst_error: float
-    intervals: int  # of mu that are given
-    covered: int  # of them hold the true one
+    intervals: int  # number of intervals of mu
+    covered: int  # number of these that contain the true mu
 
 
 @dataclass(frozen=True, slots=True)
 class FlawDetection:
-    """What went wrong in one simulated session, and whether the study says so."""
+    """The faults of one simulated session, and whether the study detects them."""
 
     session: str
     expected: str  # for people
@@ -163,22 +163,22 @@ class StudyFindings:
 
     simulated: str
     options: VisitOptions
-    visits: tuple[Visit, ...]  # all that were read, those left out too
+    visits: tuple[Visit, ...]  # all that were read, including excluded ones
     failed: tuple[tuple[str, str], ...]  # folder, why it could not be read
-    copies: tuple[tuple[str, str], ...]  # session that counts nothing, and the one whose recording it holds again
+    copies: tuple[tuple[str, str], ...]  # session not counted, and the one of which it is a copy
     excluded: tuple[Exclusion, ...]
     reversed: tuple[tuple[str, str, float], ...]  # subject, descriptor, r of score with index: still counted
     descriptors: tuple[DescriptorFindings, ...]
     effects: tuple[EffectRecovery, ...]  # where the study is synthetic
     friction: FrictionRecovery | None
     flaws: tuple[FlawDetection, ...] = ()  # where the study is synthetic
-    synthetic: int | None = None  # the seed, where it is
-    response: str = SED.name  # the quantity of the model that is held against scores
+    synthetic: int | None = None  # the seed of a synthetic study
+    response: str = SED.name  # the model's quantity that is compared with scores
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data."""
+        """Return the findings as plain data."""
         document: dict[str, Any] = {**({"simulated": self.simulated} if self.simulated else {}), **asdict(self)}
-        # `found` and `both` are names until 2026-11-26, which stay for one release
+        # The names `found` and `both`, used until 2026-11-26, stay for one release
         document["effects"] = [msgspec.to_builtins(effect) | {"found": effect.estimate} for effect in self.effects]
         for flaw in document["flaws"]:
             flaw["found"] = flaw["detected"]
@@ -215,7 +215,7 @@ class _Stroke(msgspec.Struct):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VisitFaults:
-    """What goes wrong in one subject's visit, by number of the trial; 0: nowhere."""
+    """Faults of one subject's visit, by number of the trial; 0: in none."""
 
     lost: int = 0
     frozen: int = 0
@@ -223,7 +223,7 @@ class VisitFaults:
     unanswered: int = 0
     aborted: int = 0
     reversed: bool = False
-    expected: str  # what the analysis should say
+    expected: str  # what the analysis should report
 
 
 class _GroundTruth(msgspec.Struct):
@@ -237,7 +237,7 @@ class _GroundTruth(msgspec.Struct):
 
 
 def check_ground_truth(document: object) -> dict[str, Any]:
-    """Return a study's ground truth as its file holds it. Raises ValueError where it has another form."""
+    """Return a study's ground truth as in its file. Raises ValueError where it has another form."""
     msgspec.convert(document, _GroundTruth)
     return cast("dict[str, Any]", document)
 
@@ -247,7 +247,7 @@ def effect_recoveries(
 ) -> tuple[EffectRecovery, ...]:
     """Return the true effects on the score, and spreads, with their estimates.
 
-    `ground_truth["score"]` holds the slopes of the scores on index, place and index before, and on µ by descriptor.
+    `ground_truth["score"]` holds the slopes of scores on index, place and preceding index, and on µ by descriptor.
     """
     return tuple(
         EffectRecovery(findings.descriptor, name, truth[name], *interval)
@@ -268,13 +268,13 @@ def _true_values(descriptor: str, ground_truth: Mapping[str, Any]) -> dict[str, 
     if people:
         values[LEVELS], values[NOISE] = people["offset_spread"], people["judgement_noise"]
         values[SLOPES] = (1.0 - people.get("friction_weight", 0.0)) * people["gain_spread"]
-        # A transducer's gains, of drag and of press, differ between visits as fingers do.
+        # Gains of transducers differ between visits like fingers, for drag and for press.
         values[FINGERS] = math.hypot(people["moisture"], math.sqrt(2.0) * ground_truth.get("calibration_sd", 0.0))
     return values
 
 
 def _estimates(findings: DescriptorFindings) -> dict[str, tuple[float, float, float]]:
-    """Return the estimate and the ends of its interval of each effect that has a true value, by its name in `UNITS`.
+    """Return the estimate and interval ends of each effect that has a true value, by its name in `UNITS`.
 
     Relations of scores to SEDs have the intervals for other people on the same surfaces.
     """
@@ -298,7 +298,7 @@ _FLAWS = {"lost": "lost_readings", "frozen": "frozen_sensor", "light": "too_litt
 def flaw_detections(
     visits: Sequence[Visit], failed: Mapping[str, str], faults_by_session: Mapping[str, Mapping[str, Any]]
 ) -> tuple[FlawDetection, ...]:
-    """Return for each session with faults whether what it brings, or that it brings nothing, says so."""
+    """Return, for each session with faults, whether its results or its failure to be read show them."""
     by_session = {visit.session: visit for visit in visits}
     backwards = {subject for subject, _, _ in reversed_subjects([scores_of(visit, visit.rows) for visit in visits])}
 
@@ -322,7 +322,7 @@ def flaw_detections(
 
 
 def friction_recovery(visits: Sequence[Visit], strokes: Sequence[Mapping[str, Any]]) -> FrictionRecovery | None:
-    """Return how well the µ of the strokes was estimated; None where no stroke has both."""
+    """Return how well the µ of the strokes was estimated; None where no stroke has a true and an estimated µ."""
     truth = {(stroke["subject"], stroke["trial"]): float(stroke["mu"]) for stroke in strokes}
     rows = [
         (row, truth[visit.subject, row.trial])

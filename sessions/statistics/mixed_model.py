@@ -1,9 +1,8 @@
-"""Linear mixed models of scores, subjects differing in level or slope, or crossed with surfaces.
+"""Linear mixed models of scores, with random levels and slopes of subjects, or subjects crossed with surfaces.
 
-The likelihood is written in the factor of the covariance of levels and slopes relative to what is left, as by Bates,
-Maechler, Bolker & Walker 2015 (J. Stat. Softw. 67:1, equations 34 and 41): fixed effects and scale are solved for, and
-a covariance that does not have full rank is no edge of it. Its gradient is exact, so that the maximum is found to the
-last few bits.
+The likelihood is a function of the factor of the random effects' covariance relative to the residual variance, as in
+Bates, Maechler, Bolker & Walker 2015 (J. Stat. Softw. 67:1, equations 34 and 41). Fixed effects and scale are profiled
+out, and singular covariances are interior points. The gradient is exact, so the maximum is found to the last few bits.
 """
 
 import math
@@ -19,26 +18,26 @@ from drivers.arrays import Array
 from sessions.statistics.correlations import TAILS, t_quantile
 from sessions.statistics.scores import indicator_columns, sd_interval
 
-_STARTS = (0.3, 3.0)  # spreads relative to what is left: the search starts from each pair, and the best end is kept
-_WIDEST = 1e3  # such a spread: scores have three figures, and a step of the search may not go beyond
-# Gradient of the deviance at which Newton's method takes over: a tenth or tenfold moves no number by 1e-10.
+_STARTS = (0.3, 3.0)  # spreads relative to the residual's: the search starts from each pair and keeps the best optimum
+_WIDEST = 1e3  # largest such spread in the search: scores have three figures
+# Gradient of the deviance at which Newton's method takes over: a tenth or ten times it changes no number by 1e-10.
 _NEARBY = 1e-5
 _SINGULAR = 1e-4  # of the factor's diagonal, as lme4 has it
-_NOTHING = 1e-9  # of the factor: it enters by its square, which is then below round-off
-_STEPS = 6  # of Newton's method, after which nothing moves
+_NOTHING = 1e-9  # of the factor: its square is then below round-off
+_STEPS = 6  # of Newton's method, after which nothing changes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Likelihood:
-    """The likelihood of y = X b + Z u + e by the factor L of the covariance of u relative to the variance of e.
+    """The likelihood of y = X b + Z u + e in the factor L of the covariance of u relative to the variance of e.
 
-    n values, p fixed effects b, c random ones u; of what the fixed effects leave (`reml`), or of all.
+    n values, p fixed effects b, c random effects u; restricted (`reml`) or full likelihood.
     """
 
     n: int
-    sums: Array  # of products of all columns: Z (c), X (p), and what least squares by X leaves of y
-    offset: Array  # (p,) these least squares, taken away first so that nothing cancels
-    patterns: Array  # (m, c, c): L is their sum, each times one of the m numbers that are sought
+    sums: Array  # of products of all columns: Z (c), X (p), and the least-squares residuals of y on X
+    offset: Array  # (p,) least-squares estimates, subtracted first to avoid cancellation
+    patterns: Array  # (m, c, c): L is their sum weighted by the m parameters
     reml: bool
 
     @staticmethod
@@ -65,7 +64,7 @@ class _Likelihood:
         factor, cross_products, value = self.reduce(theta)
         count = len(factor)
         half, log_det = _eliminate(cross_products[count:-1, count:-1], cross_products[count:-1])
-        cross_products = cross_products - half.T @ half  # by what the fixed effects leave
+        cross_products = cross_products - half.T @ half  # of what fixed effects do not explain
         residual_square = float(cross_products[-1, -1])
         errors = cross_products[:count, -1]
         factor_gradient = cross_products[:count, :count] - self.dof / residual_square * np.outer(errors, errors)
@@ -77,7 +76,7 @@ class _Likelihood:
         return value, 2.0 * np.einsum("mij,ij->m", self.patterns, factor_gradient @ factor)
 
     def maximum(self, starts: Sequence[Array]) -> Array:
-        """Return the numbers (m,) with the greatest likelihood."""
+        """Return the parameters (m,) of maximum likelihood."""
         from scipy.optimize import minimize  # slow to load, and a session that is opened has no need of it
 
         optima = [
@@ -94,7 +93,7 @@ class _Likelihood:
         return self._polish(min(optima, key=lambda optimum: float(optimum.fun)).x)
 
     def _polish(self, theta: Array) -> Array:
-        """Return where the gradient vanishes to round-off, by Newton's method from a point close by."""
+        """Return the zero of the gradient to round-off, by Newton's method from a nearby point."""
         value, slope = self.deviance(theta)
         for _ in range(_STEPS):
             step = 1e-6 * np.maximum(np.abs(theta), 1e-2)
@@ -102,7 +101,7 @@ class _Likelihood:
                 self.deviance(theta + offset)[1] - self.deviance(theta - offset)[1] for offset in np.diag(step)
             ]
             curvature = np.array(differences) / (2 * step[:, None])
-            # Where subjects' levels do not differ the factor may turn without changing the covariance: no step there.
+            # Without differences of levels the factor may rotate at constant covariance: no step in that direction.
             candidate = theta - np.linalg.lstsq(0.5 * (curvature + curvature.T), slope, rcond=1e-7)[0]
             candidate_value, candidate_slope = self.deviance(candidate)
             if not candidate_value <= value + 1e-9 * abs(value) or np.abs(candidate_slope).max() >= np.abs(slope).max():
@@ -113,19 +112,19 @@ class _Likelihood:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """What maximises the restricted likelihood; p fixed effects, q of them different between subjects."""
+    """The maximum of the restricted likelihood; p fixed effects, q of them random between subjects."""
 
     estimates: Array  # (p,)
     errors: Array  # (p,) standard errors
     among: Array  # (q, q) covariance of the subjects' own coefficients
-    within: float  # standard deviation of what is left
-    deviance: float  # -2 log restricted likelihood, but for a constant of the design
-    singular: bool  # `among` has not full rank
+    within: float  # residual standard deviation
+    deviance: float  # -2 log restricted likelihood, up to a constant of the design
+    singular: bool  # `among` is rank-deficient
     exact: bool  # the residuals are round-off
 
 
 def reml_fit(y: Array, columns: Array, subjects: Sequence[str] | Array, random_terms: int) -> Fit:
-    """Return the fit of y (n) by `columns` (n, p), alike in size; the first `random_terms` also differ by subject."""
+    """Return the fit of y (n) by `columns` (n, p), scaled alike; the first `random_terms` also vary by subject."""
     indicators = indicator_columns(subjects)
     random = (indicators[:, :, None] * columns[:, None, :random_terms]).reshape(len(y), -1)
     triangle = np.tril_indices(random_terms)
@@ -163,7 +162,7 @@ def _eliminate(matrix: Array, rows: Array) -> tuple[Array, float]:
 
 
 def fits_exactly(design: Array, y: Array) -> bool:
-    """Say whether columns (n, k) leave nothing of y (n) but round-off."""
+    """Say whether columns (n, k) explain y (n) to round-off."""
     residuals = y - design @ np.linalg.lstsq(design, y, rcond=None)[0]
     return float(np.abs(residuals).max()) <= 1e-9 * (1.0 + float(np.abs(y).max()))
 
@@ -171,10 +170,10 @@ def fits_exactly(design: Array, y: Array) -> bool:
 def crossed_deviance(
     subjects: Sequence[str], surfaces: Sequence[int], y: Sequence[float], x: Sequence[float]
 ) -> float | None:
-    """Return -2 log likelihood of y (n) as intercept + slope x + level of the subject + level of the surface + error.
+    """Return -2 log likelihood of y (n) = intercept + slope x + level of the subject + level of the surface + error.
 
-    By maximum likelihood. Models of the same scores with different x have as many parameters: their AICs differ as
-    their deviances do. None where x does not vary, or where the fixed terms leave no residuals.
+    By maximum likelihood. Models of the same scores with different x have equally many parameters, so AICs differ as
+    deviances do. None where x does not vary, or where the fixed terms leave no residuals.
     """
     covariate = np.asarray(x, np.float64) - np.mean(x)
     size = float(np.abs(covariate).max())
@@ -203,7 +202,7 @@ def akaike_weights(deviances: Sequence[float]) -> tuple[float, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """A standard deviation with its 95 % interval; 0 where subjects differ no more than what is left makes them."""
+    """A standard deviation with its 95 % interval; 0 where subjects differ no more than residuals explain."""
 
     sd: float
     low: float
@@ -212,13 +211,13 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Spreads:
-    """What differs between subjects, and from trial to trial within each."""
+    """Spreads between subjects, and between trials within subjects."""
 
     level: Spread  # of the subjects' levels, at the mean of the covariate [unit of y]
     slope: Spread | None  # of their slopes on the covariate [unit of y over unit of x]; None without one
-    left: Spread  # of y about each subject's own line: the noise of single trials
+    left: Spread  # of y about each subject's line: the noise of single trials
     subjects: int
-    dof: int  # of what is left
+    dof: int  # of the residuals
 
 
 INTERCEPT = "intercept"
@@ -237,17 +236,17 @@ class Term:
 
 @dataclass(frozen=True, slots=True)
 class MixedModel:
-    """A linear mixed model by restricted maximum likelihood: each subject has a level and a slope of its own."""
+    """A linear mixed model by restricted maximum likelihood: with random levels and slopes of subjects."""
 
     terms: tuple[Term, ...]
-    middle: float  # mean of the first covariate, at which the intercept and the subjects' levels are given
+    middle: float  # mean of the first covariate, where intercept and subjects' levels are defined
     between_sd: float  # of the subjects' levels
-    within_sd: float  # of what is left
+    within_sd: float  # of the residuals
     n: int
     subjects: int
     slope_sd: float  # of the subjects' slopes on the first covariate
-    singular: bool  # subjects differ in fewer ways than were fitted: a spread is 0, or level and slope go as one
-    spreads: Spreads | None  # the same standard deviations by least squares, with intervals; None where too few say so
+    singular: bool  # a spread is 0, or level and slope are perfectly correlated
+    spreads: Spreads | None  # the same standard deviations by least squares, with intervals; None with too few subjects
 
     def term(self, name: str) -> Term:
         """Return one fixed effect. Raises KeyError for one that was not in the model."""
@@ -257,14 +256,14 @@ class MixedModel:
 def mixed_model(
     subjects: Sequence[str], score: Sequence[float], covariates: Mapping[str, Sequence[float]]
 ) -> MixedModel | str:
-    """Return score (n) as intercept + sum of slopes times covariates (n each) + the subject's level + what is left.
+    """Return the model score (n) = intercept + slopes times covariates (n each) + level of the subject + error.
 
-    Each subject also has its own slope on the first covariate, else the interval of that slope would be too narrow
-    where subjects use more or less of the scale. t intervals have as many degrees of freedom as subjects less one for
-    the level, as subjects in whom the covariate varies less one for the slope, and for the others as many as a fit to
-    each subject alone would leave. The first covariate counts from its mean, so that an offset of it changes nothing.
+    Each subject also has its own slope on the first covariate; otherwise that slope's interval would be too narrow
+    where subjects use more or less of the scale. t intervals have these degrees of freedom: subjects - 1 for the level,
+    subjects in whom the covariate varies - 1 for the slope, and for the others those left by separate fits to each
+    subject. The first covariate is centred, so that an offset of it changes nothing.
 
-    Carry-over and drift are covariates: index before, place in the block. A sentence says why where there is no model.
+    Carry-over and drift are covariates: preceding index, place in the block. Without a model a sentence says why.
     """
     names = [INTERCEPT, *covariates]
     columns = np.column_stack([np.ones(len(score)), *covariates.values()])
@@ -273,7 +272,7 @@ def mixed_model(
         return f"{len(score)} scores of {count} subjects are too few for {len(names)} terms and a level of each subject"
     middle = float(columns[:, 1].mean())
     columns[:, 1] -= middle
-    scale = np.abs(columns).max(axis=0)  # covariates in any unit are fitted alike well
+    scale = np.abs(columns).max(axis=0)  # so covariates in any unit are fitted equally well
     if not scale.all() or np.linalg.matrix_rank(columns / scale) < len(names):
         return "a term does not vary, or others determine it"
     varies = sum(float(np.ptp(columns[np.array(subjects) == subject, 1])) > 0.0 for subject in set(subjects))
@@ -310,14 +309,14 @@ def _term(name: str, estimate: float, error: float, dof: int) -> Term:
 def spreads(
     subjects: Sequence[str], y: Sequence[float], common: Sequence[Sequence[float]], x: Sequence[float] | None = None
 ) -> Spreads | None:
-    """Return the spreads of y (n): each subject has its own level, with `x` (n) its own slope, all share `common`.
+    """Return the spreads of y (n): levels vary by subject, with `x` (n) also slopes; all share slopes on `common`.
 
-    `common` holds covariates (n each) whose slopes are one for all. Fitted by least squares; a subject's coefficients
-    then vary between subjects by their own variance and by that of their error, which is taken away. Intervals: chi
-    squared for what is left; for the others that of a difference of two mean squares (modified large sample: Ting,
-    Burdick, Graybill, Jeyaratnam & Lu 1990, J. Stat. Comput. Simul. 35:135), with unweighted coefficients where
-    subjects have unlike trials (Thomas & Hultquist 1978, Ann. Stat. 6:582). Subjects with too few trials for a line of
-    their own do not count. None for fewer than three subjects, or where covariates determine each other.
+    `common` holds covariates (n each). Fitted by least squares; the variance of subjects' coefficients is their own
+    variance plus that of their error, which is subtracted. Intervals: chi squared for the residuals; for the others
+    that of a difference of two mean squares (modified large sample: Ting, Burdick, Graybill, Jeyaratnam & Lu 1990, J.
+    Stat. Comput. Simul. 35:135), with unweighted coefficients where subjects have different trials (Thomas & Hultquist
+    1978, Ann. Stat. 6:582). Subjects with too few trials for their own line do not count. None for fewer than three
+    subjects, or collinear covariates.
     """
     line_terms = 1 if x is None else 2
     _, members, trials = np.unique(np.array(subjects), return_inverse=True, return_counts=True)
@@ -356,7 +355,7 @@ def spreads(
 
 
 def difference_of_squares(first: float, first_dof: int, second: float, second_dof: int) -> Spread:
-    """Return the root of `first` less `second`, two independent mean squares.
+    """Return the square root of the difference of two independent mean squares.
 
     Its lower end is 0 exactly where an F test does not distinguish the two.
     """

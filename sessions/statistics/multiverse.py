@@ -1,8 +1,8 @@
-"""One recording along many paths: every reasonable choice of the analysis crossed with every other (a multiverse).
+"""A multiverse: one recording analysed along many paths, all combinations of reasonable choices.
 
-What a study concludes should not depend on a choice that others would have made differently (Steegen, Tuerlinckx,
-Gelman and Vanpaemel 2016, Perspect. Psychol. Sci. 11:702). Friction is found along each path, and contact is solved
-at every friction that is met: nothing is interpolated.
+A study's conclusion should not depend on a choice that others would make differently (Steegen, Tuerlinckx, Gelman and
+Vanpaemel 2016, Perspect. Psychol. Sci. 11:702). Friction is computed along each path, and contact is solved for each
+friction, without interpolation.
 """
 
 import math
@@ -37,7 +37,7 @@ from sessions.strokes.stroke import FIXED, HERTZ_EXPONENT, AreaLaw, Rule
 Kinematics = Literal["small", "finite"]
 Values = tuple[float | None, ...]  # of one quantity along each of `PATHS`, or only those at small strain
 
-# Of each choice the usual one comes first.
+# The usual value of each choice comes first.
 FILTERS: Mapping[str, float] = {"20 Hz": 20.0, "none": math.inf}
 WINDOWS: Mapping[str, WindowRule] = {
     "least variance, widened": "widened",
@@ -58,7 +58,7 @@ SAME = 0.005  # correlations that differ by less are one result: pages print two
 
 @dataclass(frozen=True, slots=True)
 class Path:
-    """One choice of everything."""
+    """One combination of choices."""
 
     filter: str
     window: str
@@ -68,7 +68,7 @@ class Path:
     kinematics: Kinematics
 
     def usual(self, rule: str, kinematics: str, law: AreaLaw = FIXED) -> bool:
-        """Say whether it is the way that every other number went, mu computed by `rule` and tau_max by `law`."""
+        """Say whether this is the path of all other results, with mu by `rule` and tau_max by `law`."""
         usual = (next(iter(FILTERS)), next(iter(WINDOWS)), RECEPTORS[0], (law, 1.0))
         choices = (self.filter, self.window, self.receptor, _AREAS[self.area])
         return choices == usual and self.mu == rule and self.kinematics == kinematics
@@ -85,7 +85,7 @@ CHOICE_LABELS: Mapping[str, str] = {  # of the fields of a path
 
 _FIRST = (next(iter(FILTERS)), next(iter(WINDOWS)), next(iter(_AREAS)))
 _SMALL = tuple(Path(*choice, "small") for choice in product(FILTERS, WINDOWS, MUS, _AREAS, RECEPTORS))
-# Finite strain takes many times as long: filter, window and area are the usual ones there.
+# Finite strain takes many times as long, so it uses only the usual filter, window and area.
 _USUAL = (path for path in _SMALL if (path.filter, path.window, path.area) == _FIRST)
 PATHS = (*_SMALL, *(replace(path, kinematics="finite") for path in _USUAL))
 
@@ -98,16 +98,16 @@ def trial_paths(
     finite: bool = False,
     quantity: Quantity = SED,
 ) -> Mapping[int, Values]:
-    """Return a settled quantity of each trial along each of `PATHS`; None where a path gives none.
+    """Return a settled quantity of each trial along each of `PATHS`; None where a path has none.
 
-    `prediction` is that of the session: what it found is where its paths begin, on its mesh. Without `finite` only
-    paths at small strain, which come first. Direction and speed are those of the usual path: neither is a matter of
-    choice. Raises as `predict` does.
+    `prediction` is the session's: paths start from its solutions, on its mesh. Without `finite` only paths at small
+    strain, which come first, are followed. Direction and speed are those of the usual path, since neither is a choice.
+    Raises as `predict` does.
     """
     paths = [path for path in PATHS if finite or path.kinematics == "small"]
     analyses = _analyses(recording)
     usual_friction = {friction.trial: friction for friction in next(iter(analyses.values())).friction}
-    scenes: dict[Path, Mapping[int, Scene]] = {}  # for either receptor
+    scenes: dict[Path, Mapping[int, Scene]] = {}  # for both receptors
     for path in paths:
         if path.receptor == RECEPTORS[0]:
             options = replace(prediction.options, course="steady", kinematics=path.kinematics)
@@ -126,7 +126,7 @@ def trial_paths(
 
 
 def _analyses(recording: Recording) -> Mapping[tuple[str, str, AreaLaw], Analysis]:
-    """Return the analysis by filter, window and law of the area; with other laws than the first for one window only."""
+    """Return the analysis by filter, window and law of the area; laws other than the first for one window only."""
     planned, *laws = dict.fromkeys(law for law, _ in _AREAS.values())
     cases = [*product(FILTERS, WINDOWS, [planned]), *product(FILTERS, list(WINDOWS)[:1], laws)]
 
@@ -142,7 +142,7 @@ def _path_analysis(
     path: Path,
     usual: Mapping[int | None, FrictionParameters],
 ) -> Analysis:
-    """Return the analysis with the friction that a path gives each trial; no window has a say in tau_max."""
+    """Return the analysis with each trial's friction along a path; tau_max does not depend on the window."""
     (law, share), (window, *_) = _AREAS[path.area], WINDOWS
     analysis = analyses[path.filter, path.window, _AREAS[next(iter(_AREAS))][0]]
     bounds = analyses[path.filter, window, law].strokes
@@ -159,10 +159,10 @@ def _path_analysis(
 def _solve_scenes(
     scenes: Sequence[Scene], predictions: Sequence[Prediction], quantity: Quantity, progress: Progress | None
 ) -> Mapping[Scene, Pair | None]:
-    """Return a quantity over the ending and at its middle of each scene, None where it has no settled state.
+    """Return a quantity of each scene, over the ending and at its middle; None without a settled state.
 
-    Scenes that differ in friction alone are found beside one that is known, on its mesh, or else beside that of least
-    friction, which is solved; where that fails they are solved themselves.
+    Scenes that differ only in friction are continued from a known solution on its mesh, or else from the solved scene
+    of least friction; where that fails they are solved themselves.
     """
     in_order = sorted(scenes, key=lambda scene: (scene.friction.mu, scene.friction.tau_max or math.inf))
     by_setup = by_key((_setup(scene), scene) for scene in in_order)
@@ -182,7 +182,7 @@ def _solve_scenes(
 
 
 def _pairs(slide: Nearby | None, scenes: Sequence[Scene], quantity: Quantity) -> Mapping[Scene, Pair]:
-    """Return a quantity over the ending and at its middle of those scenes that a slide leads to."""
+    """Return a quantity over the ending and at its middle of the scenes reached from a slide."""
     if slide is None:
         return {}
     pairs = slide.responses(scenes)[:, QUANTITIES.index(quantity)].tolist()
@@ -190,13 +190,13 @@ def _pairs(slide: Nearby | None, scenes: Sequence[Scene], quantity: Quantity) ->
 
 
 def _setup(scene: Scene) -> Scene:
-    """Return a scene settled and without friction: the same of all that differ in that alone."""
+    """Return the settled frictionless scene, equal for scenes that differ in friction alone."""
     return replace(scene, friction=Friction(0.0), solve=replace(scene.solve, course="steady"))
 
 
 @dataclass(frozen=True, slots=True)
 class PathFinding:
-    """How a predicted quantity and scores go together along one path. None where too few numbers are left."""
+    """Correlation of a predicted quantity with scores along one path. None with too few numbers."""
 
     path: Path
     usual: bool
@@ -204,18 +204,18 @@ class PathFinding:
     trials: int
     r: float | None  # Pearson's, of the mean prediction of each surface against its mean score
     within: float | None  # repeated-measures correlation of each subject's own scores and predictions
-    low: float | None  # 95 % interval of `within`, for other people on the same surfaces
+    low: float | None  # 95 % interval of `within`, for other subjects on the same surfaces
     high: float | None
 
 
 @dataclass(frozen=True, slots=True)
 class PathTrial:
-    """One trial as the paths need it."""
+    """One trial's data for the paths."""
 
     subject: str
     index: int
     score: float | None
-    rule: str  # which mu is the usual one
+    rule: str  # the usual rule of mu
     values: Values
 
 
@@ -257,8 +257,8 @@ def _finding(number: int, path: Path, trials: Sequence[PathTrial], *, usual: boo
 class FiveNumberSummary:
     """Extremes, quartiles and median of the correlations of some paths."""
 
-    correlated: int  # paths with a correlation; the numbers below are theirs
-    distinct: int  # of these correlations, as many differ by more than `SAME`
+    correlated: int  # paths with a correlation; the numbers below describe these
+    distinct: int  # number of these that differ by more than `SAME`
     least: float
     lower: float  # quartile
     median: float
@@ -267,14 +267,14 @@ class FiveNumberSummary:
 
 
 def correlations(findings: Iterable[PathFinding]) -> list[float | None]:
-    """Return the correlation of each path: within subjects where any path has that, else of the means."""
+    """Return the correlation of each path: within subjects if any path has one, else of the means."""
     paths = list(findings)
     within = any(finding.within is not None for finding in paths)
     return [finding.within if within else finding.r for finding in paths]
 
 
 def five_number_summary(values: Sequence[float | None]) -> FiveNumberSummary | None:
-    """Return the five-number summary of correlations; None where there is none.
+    """Return the five-number summary of correlations; None without any.
 
     >>> summary = five_number_summary([0.5, None, 0.7, 0.701])
     >>> summary.median, summary.correlated, summary.distinct
@@ -292,9 +292,9 @@ def five_number_summary(values: Sequence[float | None]) -> FiveNumberSummary | N
 
 
 def by_choice(findings: Sequence[PathFinding]) -> tuple[tuple[str, str, FiveNumberSummary | None, bool], ...]:
-    """Return for each value of each choice the five-number summary over all paths with it, and whether it is usual.
+    """Return each choice's values with the five-number summary over their paths, and whether each is usual.
 
-    Medians that lie far apart within a choice say that it matters.
+    Very different medians within a choice show that the choice matters.
     """
     values = correlations(findings)
     rows: list[tuple[str, str, FiveNumberSummary | None, bool]] = []

@@ -77,10 +77,10 @@ def pool_visits(
     options: VisitOptions | None = None,
     quantity: Quantity = SED,
 ) -> StudyFindings:
-    """Return the findings of all visits together, which are taken in the order of their names.
+    """Return the pooled findings of all visits, sorted by name.
 
-    `options` are those of each visit; `quantity` is the model's response that is compared with scores.
-    `ground_truth` is that of a synthetic study; nothing but the comparison uses it.
+    `options` are those of each visit; `quantity` is the model's response that is compared with scores. `ground_truth`
+    of a synthetic study is used for the comparison only.
     """
     in_order = tuple(sorted(visits, key=lambda visit: visit.session))
     same_content = by_key((visit.content_sha256, visit.session) for visit in in_order if visit.content_sha256)
@@ -180,7 +180,7 @@ def rival_values(row: TrialRow) -> dict[str, float]:
 
 
 def response_term(quantity: Quantity) -> str:
-    """Return the name of a quantity in mixed models, with the unit in which people read it.
+    """Return the name of a quantity in mixed models, with its shown unit.
 
     >>> response_term(SED)
     'SED [kPa]'
@@ -189,9 +189,9 @@ def response_term(quantity: Quantity) -> str:
 
 
 def _model(trials: Sequence[tuple[str, TrialRow, float]], quantity: Quantity, *terms: str) -> MixedModel | str:
-    """Return the mixed model of scores on `terms`, drift and carry-over, or why there is none.
+    """Return the mixed model of scores on `terms`, drift and carry-over, or the reason why there is none.
 
-    Trials are subject, row and score. Subjects have slopes of their own on the first of `terms`.
+    Trials are subject, row and score. Slopes on the first of `terms` vary between subjects.
     """
     count = len({subject for subject, _, _ in trials})
     if count < 3:
@@ -211,7 +211,7 @@ def _model(trials: Sequence[tuple[str, TrialRow, float]], quantity: Quantity, *t
 
 
 def _fingers(trials: Sequence[tuple[str, int, float]]) -> Spread | None:
-    """Return how far subjects' friction differs from one another, of trials' subject, index and mu."""
+    """Return the spread of log friction between subjects; trials are subject, index and mu."""
     indices = sorted({index for _, index, _ in trials})
     surfaces = [[float(index == surface) for _, index, _ in trials] for surface in indices[1:]]
     variances = spreads([subject for subject, _, _ in trials], [math.log(mu) for _, _, mu in trials], surfaces)
@@ -219,7 +219,7 @@ def _fingers(trials: Sequence[tuple[str, int, float]]) -> Spread | None:
 
 
 def _surface(index: int, quantity: str, trials: Trials) -> SurfaceMean:
-    """Return means over subjects, each subject's own repeats averaged first."""
+    """Return means over subjects, each subject's repeats averaged first."""
 
     def over_subjects(value: Callable[[TrialRow], float | None]) -> Average | None:
         by_subject = by_key((visit.subject, number) for visit, row in trials if (number := value(row)) is not None)
@@ -265,11 +265,11 @@ def _averages(table: Table) -> dict[int, Average]:
     return {index: mean for index, values in sorted(by_index.items()) if (mean := average(values)) is not None}
 
 
-# What trials answer otherwise than on a line: magnitude estimates, and choices of two.
+# Answers other than on a line: magnitude estimates, and choices of two.
 
 
 def estimates(trials: Trials, quantity: str) -> Estimates | None:
-    """Return the means of magnitude estimates and their relation to that quantity; None without estimates."""
+    """Return the means of magnitude estimates and their relation to a quantity; None without estimates."""
     rows = [(visit.subject, row, row.estimate) for visit, row in trials if row.estimate is not None]
     if not rows:
         return None
@@ -285,7 +285,7 @@ def estimates(trials: Trials, quantity: str) -> Estimates | None:
 
 
 def exponent(trials: Trials) -> Exponent | None:
-    """Return Stevens' exponent of magnitude estimates by the µ of the same strokes; None without estimates."""
+    """Return Stevens' exponent of magnitude estimates on the µ of the same strokes; None without estimates."""
     if all(row.estimate is None for _, row in trials):
         return None
     complete = [
@@ -299,9 +299,9 @@ def exponent(trials: Trials) -> Exponent | None:
 
 
 def choices(trials: Trials) -> list[Choice]:
-    """Return every choice between the surface of a trial and the one stroked just before it, without a standard.
+    """Return all choices between a trial's surface and the one stroked just before it, without a standard.
 
-    Pairs with a standard have a psychometric function; by them alone most scales would have no bound.
+    Pairs with a standard have a psychometric function; they alone leave most scales unbounded.
     """
     return [
         Choice(visit.subject, row.before, row.index, row.choice == "first")
@@ -339,7 +339,7 @@ def subject_function(trials: Trials) -> Psychometric:
 def latent_scales(
     trials: Trials, scales: Sequence[PairedScale], comparisons: ConstantStimuli | None
 ) -> Mapping[Judgement, Mapping[int, IntervalEstimate]]:
-    """Return the latent values of each surface by every kind of judgement that has some."""
+    """Return the latent values of each surface by each kind of judgement that has any."""
     scores = [(visit.subject, row.index, row.score) for visit, row in trials if row.score is not None]
     estimates = [(visit.subject, row.index, row.estimate) for visit, row in trials if row.estimate is not None]
     logs = [(subject, index, math.log(estimate)) for subject, index, estimate in estimates if estimate > 0.0]

@@ -1,9 +1,9 @@
-"""What a study's design can show: the power of its test, and how often it names the quantity that scores follow.
+"""Capability of a study's design: the power of its test, and how often it identifies the quantity scores follow.
 
-Power is the share of simulated studies whose test detects the assumed effect. For the second question scores are a line
-in one quantity with levels of people and noise. The rivals are all quantities of the report that a stroke has, and the
-one of the greatest Akaike weight is preferred. Twins of the true quantity correlate with it over all strokes with
-|r| of at least 0.99. T is left out: with one area it is the bound itself.
+Power is the share of simulated studies whose test detects the assumed effect. For the identification, scores are a
+linear function of one quantity with random levels and noise. The rivals are all quantities of the report that a stroke
+has; the one with the greatest Akaike weight is preferred. Twins of the true quantity correlate with it over all strokes
+with |r| of at least 0.99. T is left out: with one area it equals the bound.
 """
 
 import math
@@ -25,23 +25,23 @@ MU_RANGE = (0.24, 0.67)  # least and greatest µ of the published surfaces
 
 @dataclass(frozen=True, slots=True)
 class AssumedEffects:
-    """Effect and spreads of simulated scores. The default values are not measured: a pilot's mixed model gives them."""
+    """Effect and spreads of simulated scores. The defaults are not measured; a pilot's mixed model gives values."""
 
     effect: float = 20.0  # of the mean score, from the least to the greatest µ or other quantity [0–100]
     noise: float = 12.0  # standard deviation of a score about its subject's line [0–100]
     level_sd: float = 12.0  # between subjects, of the level [0–100]
-    slope_sd: float = 0.5  # between subjects, of the effect, by the mean effect [-]
-    friction_sd: float = 0.1  # of the µ of one stroke about the surface's, by it [-]
+    slope_sd: float = 0.5  # between subjects, of the effect, relative to the mean effect [-]
+    friction_sd: float = 0.1  # of the µ of one stroke, relative to the surface's µ [-]
 
 
 @dataclass(frozen=True, slots=True)
 class Power:
-    """How often studies of one design detect the effect."""
+    """Power of one design."""
 
     subjects: int
     surfaces: int
-    detections: int  # studies of which the test detects the effect with its sign
-    wrong: int  # studies of which it detects the other sign
+    detections: int  # studies whose test detects the effect with its sign
+    wrong: int  # studies whose test detects the opposite sign
     studies: int
 
     @property
@@ -51,7 +51,7 @@ class Power:
 
     @property
     def half(self) -> float:
-        """Half of the 95 % interval of the power that comes of so many studies [-]."""
+        """Half-width of the 95 % interval of the power, for the number of studies [-]."""
         return 1.96 * math.sqrt(max(self.share * (1.0 - self.share), 0.25 / self.studies) / self.studies)
 
 
@@ -63,11 +63,11 @@ def power(
     seed: int,
     progress: Callable[[float], None] = lambda _: None,
 ) -> list[Power]:
-    """Return the power of every design of so many subjects and surfaces, one trial a surface.
+    """Return the power of each combination of subjects and surfaces, with one trial for each surface.
 
-    The test is that of a study's page: the correlation within subjects of the scores with what was measured of each
-    subject's own strokes, with the jackknife's p over subjects. The surfaces' µ are evenly spaced over those of the
-    paper, and all subjects meet the same ones. Scores end at 0 and 100.
+    The test is the one on a study's page: the correlation of scores with measured µ within subjects, with the
+    jackknife's p over subjects. The surfaces' µ are evenly spaced over the published range, and all subjects meet the
+    same surfaces. Scores are clipped to 0 and 100.
     """
     designs = [(people, count) for people in subjects for count in surfaces]
     powers: list[Power] = []
@@ -83,7 +83,7 @@ def power(
 def _study(
     effects: AssumedEffects, people: int, count: int, rng: np.random.Generator
 ) -> tuple[list[str], Array, Array]:
-    """Return subject, µ as measured and score of each trial."""
+    """Return subject, measured µ and score of each trial."""
     stroke_mu = np.linspace(*MU_RANGE, count) * np.exp(rng.normal(0.0, effects.friction_sd, (people, count)))
     slope = effects.effect * (1.0 + effects.slope_sd * rng.standard_normal((people, 1))) / (MU_RANGE[1] - MU_RANGE[0])
     level = _MIDDLE + effects.level_sd * rng.standard_normal((people, 1))
@@ -93,7 +93,7 @@ def _study(
 
 
 def _verdict(subjects: Sequence[str], mu: Array, scores: Array) -> float:
-    """Return the sign that the test finds, 0 where it finds none."""
+    """Return the sign of a significant effect, 0 without one."""
     repeated = repeated_correlation(subjects, mu.tolist(), scores.tolist())
     if repeated is None or repeated.people_p is None or repeated.people_p >= ALPHA:
         return 0.0
@@ -104,7 +104,7 @@ TWIN = 0.99  # correlation over all strokes
 
 
 class Recovery(msgspec.Struct, frozen=True):
-    """What the studies of one design prefer."""
+    """How often studies of one design prefer the true quantity."""
 
     people: int
     surfaces: int
@@ -125,7 +125,7 @@ def recovery(
     studies: int,
     draw: np.random.Generator,
 ) -> Recovery:
-    """Return how often studies of so many of the people in `strokes` prefer the quantity that scores follow."""
+    """Return how often studies of `people` drawn from `strokes` prefer the quantity that scores follow."""
     surfaces = strokes[quantity].shape[1] // len(depths)
     weights = [study_weights(strokes, people, surfaces, quantity, effects, draw) for _ in range(studies)]
     twin_names, preferred = twins(strokes, quantity), [max(study, key=study.__getitem__) for study in weights]
@@ -143,14 +143,14 @@ def study_weights(
 ) -> dict[str, float]:
     """Return the Akaike weight of each rival in one synthetic study of `people` drawn from `strokes` (people, trials).
 
-    Trials go surface by surface within depths.
+    Trials are ordered by depth, then by surface.
     """
     sample = draw.choice(len(strokes[quantity]), people, replace=False)
     values = {name: population[sample] for name, population in strokes.items()}
     usable = np.isfinite(np.stack(list(values.values()))).all(axis=0)
     finite: Array = strokes[quantity][np.isfinite(strokes[quantity])]
     level, noise = draw.standard_normal((people, 1)), draw.standard_normal(usable.shape)
-    # The effect spans a range over which the quantity is spread evenly: one standard deviation is its part of √12.
+    # The effect spans the range of a uniform quantity, whose standard deviation is the range over √12.
     slope = effects.effect / math.sqrt(12.0) * np.ones((people, 1))
     if effects.slope_sd:
         slope *= 1.0 + effects.slope_sd * draw.standard_normal((people, 1))

@@ -1,17 +1,17 @@
 """The psychometric function of constant stimuli: how often a comparison is judged to have more than the standard.
 
 P(comparison chosen) = lapse / 2 + (1 - lapse) Φ(slope (x - PSE + order o)), where x is the logarithm of the ratio of
-magnitudes, o is 1 where the comparison came second and -1 where it came first, and a lapse is an answer by chance
-(Wichmann and Hill 2001, Percept. Psychophys. 63, 1293). Answers to one pair may scatter more than a binomial law: they
-follow a beta-binomial one (Schütt et al. 2016, Vision Res. 122, 105). Fitted by maximum likelihood; intervals are of
-the profile likelihood, which needs no symmetry and holds at the edge where there is no lapse (Venzon and Moolgavkar
-1988, Appl. Stat. 37, 87).
+magnitudes, o is 1 where the comparison came second and -1 where it came first, and a lapse is a random answer (Wichmann
+and Hill 2001, Percept. Psychophys. 63, 1293). Answers to one pair may scatter more than binomially: they follow a
+beta-binomial law (Schütt et al. 2016, Vision Res. 122, 105). The fit is by maximum likelihood; intervals are from the
+profile likelihood, which requires no symmetry and holds at the boundary of no lapses (Venzon and Moolgavkar 1988, Appl.
+Stat. 37, 87).
 
-The greatest likelihood takes the scatter of few levels for too small, since the function has been fitted to them. The
-intervals' likelihood is therefore adjusted for that by half the logarithm of the function's information (Cox and Reid
-1987, J. R. Stat. Soc. B 49, 1), which restricted maximum likelihood does for variances. With n levels in either order
-and p parameters of the function, it has dropped at an end by half of (n - p) ln(1 + F(1, n - p) / (n - p)): what it
-drops by where a normal law of unknown variance has Student's interval.
+Maximum likelihood underestimates the scatter of few levels, since the function was fitted to them. The likelihood of
+the intervals is therefore adjusted by half the logarithm of the function's information (Cox and Reid 1987, J. R. Stat.
+Soc. B 49, 1), as in restricted maximum likelihood. With n levels in either order and p parameters of the function, it
+drops at an end by half of (n - p) ln(1 + F(1, n - p) / (n - p)), the drop at which a normal law of unknown variance has
+Student's interval.
 """
 
 import math
@@ -28,24 +28,24 @@ from sessions.statistics.correlations import CONFIDENCE
 from sessions.statistics.scores import IntervalEstimate, by_key
 
 QUARTILE = float(special.ndtri(0.75))  # from the PSE to the JND, where three of four answers name the comparison [z]
-LEAST_LEVELS = 3  # of x: two fit any PSE and JND, whatever the lapses
-MOST_LAPSES = 0.5  # beyond it an observer mostly guesses, and a lapse cannot be distinguished from a flat slope
-MOST_SCATTER = 1.0  # of the beta law's theta; its correlation is then 1/2, and most cells are answered all one way
-STEEPEST = 100.0  # slope by the spread of levels, beyond which any function is a step for all levels that there are
+LEAST_LEVELS = 3  # of x: two do not determine PSE, JND and lapses
+MOST_LAPSES = 0.5  # beyond it an observer mostly guesses, and lapses cannot be distinguished from a flat slope
+MOST_SCATTER = 1.0  # of the beta law's theta; the correlation is then 1/2, and most levels have identical answers
+STEEPEST = 100.0  # slope times the spread of levels, beyond which any function is a step at these levels
 _PSE, _SLOPE, _ORDER, _LAPSE, _SCATTER = range(5)
-_SAME = 1e-6  # difference of log likelihoods that makes none
+_SAME = 1e-6  # negligible difference of log likelihoods
 _PRECISE, _ENOUGH = 1e-15, 1e-9  # relative change of the likelihood that ends a search: estimate, end of an interval
 _SOME_SCATTER = 0.05  # theta from which a search begins, since it may not leave an edge
-_SLOPES = (0.5, 2.0, 8.0, 32.0)  # by the spread of levels, and shares of lapses, from which searches begin
+_SLOPES = (0.5, 2.0, 8.0, 32.0)  # start values: slopes relative to the spread of levels, and shares of lapses
 _LAPSES = (0.01, 0.1, 0.3)
-_DOUBLINGS = 12  # of a step away from the estimate, until the likelihood has dropped enough
+_DOUBLINGS = 12  # of the step from the estimate, until the likelihood drops enough
 
 
 @dataclass(frozen=True, slots=True)
 class Level:
     """The answers to one comparison in one order."""
 
-    log_ratio: float  # of the comparison's magnitude by the standard's [-]
+    log_ratio: float  # of the comparison's magnitude to the standard's [-]
     choices: int  # how often the comparison was judged to have more
     presented: int
     order: int = 0  # 1: the comparison came second; -1: first; 0: not known
@@ -53,19 +53,19 @@ class Level:
 
 @dataclass(frozen=True, slots=True)
 class Psychometric:
-    """One psychometric function. There are no values where `reason` says why."""
+    """One psychometric function. Without values `reason` says why."""
 
     answers: int
     pse: IntervalEstimate | None = None  # log ratio at which both are chosen equally often [-]
-    # From there to three choices of four, lapses taken away, in log ratio; 0 where answers step between two levels [-].
+    # From the PSE to three of four choices, without lapses, in log ratio; 0 where answers step between two levels [-].
     jnd: IntervalEstimate | None = None
-    lapse: IntervalEstimate | None = None  # share of answers by chance [-]
-    # Of answers to one pair in one order; 0: binomial scatter; None where no scatter makes them likelier [-]
+    lapse: IntervalEstimate | None = None  # share of random answers [-]
+    # Of answers to one pair in one order; 0: binomial scatter; None where the likelihood does not depend on it [-]
     correlation: IntervalEstimate | None = None
-    order: IntervalEstimate | None = None  # log ratio that coming second adds; None where orders are not known [-]
-    rises: bool = True  # the comparison is chosen more often as its magnitude grows
+    order: IntervalEstimate | None = None  # log ratio added by coming second; None where orders are unknown [-]
+    rises: bool = True  # the comparison is chosen more often with greater magnitude
     log_likelihood: float | None = None
-    deviance: float | None = None  # of the binomial law, against a chance of its own for every level and order
+    deviance: float | None = None  # of the binomial law, against a separate probability for every level and order
     freedom: int | None = None  # degrees of freedom of that deviance
     reason: str = ""
 
@@ -95,7 +95,7 @@ def psychometric(levels: Sequence[Level]) -> Psychometric:
 
 
 def binomial_deviance(k: Array, n: Array, p: Array) -> float:
-    """Return the deviance of chances p from k of n answers, against the saturated model k / n."""
+    """Return the deviance of probabilities p for k of n answers, against the saturated model k / n."""
     return 2.0 * float((special.rel_entr(k, n * p) + special.rel_entr(n - k, n * (1.0 - p))).sum())
 
 
@@ -107,7 +107,7 @@ class _ProfileLikelihood:
         self.orders = np.array([float(level.order) for level in levels])
         self.choices = np.array([float(level.choices) for level in levels])
         self.n = np.array([float(level.presented) for level in levels])
-        # Of every answer: level, how many came before, whether the comparison was chosen, and how many like it before.
+        # For every answer: level, number of earlier ones, if the comparison was chosen, number of equal earlier ones.
         self.level = np.repeat(np.arange(len(levels)), [level.presented for level in levels])
         self.trial = np.concatenate([np.arange(float(level.presented)) for level in levels])
         self.is_chosen = self.trial < self.choices[self.level]
@@ -126,7 +126,7 @@ class _ProfileLikelihood:
         self.scale = np.array([self.spread, 1.0 / self.spread, self.spread, 0.1, 0.1])
         self.parameters = sum(low < high for low, high in self.bounds[:_SCATTER])
         dof = max(len(levels) - self.parameters, 1)
-        # Root of what the adjusted log likelihood falls by at an end.
+        # Square root of the drop of the adjusted log likelihood at an end.
         self.drop = math.sqrt(dof / 2.0 * math.log1p(float(special.fdtri(1, dof, CONFIDENCE)) / dof))
         self.best, self.likelihood = self._search()
         with_scatter = np.append(self.best[:_SCATTER], _SOME_SCATTER)
@@ -135,17 +135,17 @@ class _ProfileLikelihood:
 
     @property
     def flat(self) -> bool:
-        """Say whether all answers are alike, or the JND lies beyond everything that was compared."""
+        """Say whether all answers are the same, or the JND is beyond the range of comparisons."""
         return self.choices.sum() in (0.0, self.n.sum()) or abs(float(self.best[_SLOPE])) * self.reach < QUARTILE
 
     @property
     def scatters(self) -> bool:
-        """Say whether the likelihood depends on the scatter: neither a step does nor single answers."""
+        """Say whether the likelihood depends on the scatter, unlike for a step or single answers."""
         none, most = (self._fit({_SCATTER: theta}, self.best)[1] for theta in self.bounds[_SCATTER])
         return abs(most - none) > _SAME
 
     def estimate(self, parameter: int) -> IntervalEstimate:
-        """Return a parameter with its interval of the profile likelihood."""
+        """Return a parameter with its interval from the profile likelihood."""
         value = float(self.best[parameter])
         low, high = self._limit(parameter, -1.0), self._limit(parameter, 1.0)
         low, high = None if low is None else min(low, value), None if high is None else max(high, value)
@@ -154,7 +154,7 @@ class _ProfileLikelihood:
     def _search(self) -> tuple[Array, float]:
         """Return the best parameters and their log likelihood.
 
-        The likelihood has several maxima: of each steepness and share of lapses the likeliest of a grid is followed.
+        The likelihood has several maxima: searches start at the likeliest grid point of each slope and share of lapses.
         """
         levels = np.unique(self.x)
         points = np.concatenate([levels, (levels[1:] + levels[:-1]) / 2.0])
@@ -171,7 +171,7 @@ class _ProfileLikelihood:
         return step if step[1] > likelihood - _SAME else (best, likelihood)
 
     def _limit(self, parameter: int, sense: float) -> float | None:
-        """Return the bound of an interval towards `sense`: its edge where the likelihood drops too little, or None."""
+        """Return the bound of an interval towards `sense`: the edge or None where the likelihood drops too little."""
         edge = self.bounds[parameter][1 if sense > 0.0 else 0]
         value, start = float(self.top[parameter]), self.top
         fallback = None if parameter in (_PSE, _ORDER) else edge
@@ -185,8 +185,8 @@ class _ProfileLikelihood:
             nonlocal start
             if trial not in drops:
                 optimum, likelihood = self._fit({parameter: trial}, start, adjusted=True)
-                drops[trial] = math.sqrt(max(self.adjusted - likelihood, 0.0)) - self.drop  # nearly a straight line
-                start = optimum if drops[trial] < 0.0 else start  # beyond the interval a fit may lie far off
+                drops[trial] = math.sqrt(max(self.adjusted - likelihood, 0.0)) - self.drop  # nearly linear
+                start = optimum if drops[trial] < 0.0 else start  # beyond the interval a fit may be far away
             return drops[trial]
 
         inner, step = value, float(self.scale[parameter]) / 4.0
@@ -202,7 +202,7 @@ class _ProfileLikelihood:
     def _fit(
         self, fixed: dict[int, float], start: Array, precision: float = _ENOUGH, *, adjusted: bool = False
     ) -> tuple[Array, float]:
-        """Return the best parameters with some held, and their log likelihood, or their adjusted one."""
+        """Return the best parameters with some fixed, and their log likelihood, or the adjusted one."""
         from scipy.optimize import minimize  # likewise
 
         bounds = [(fixed[n], fixed[n]) if n in fixed else pair for n, pair in enumerate(self.bounds)]
@@ -223,7 +223,7 @@ class _ProfileLikelihood:
         return np.asarray(optimum.x, np.float64) * self.scale, -float(optimum.fun)
 
     def chances(self, parameters: Array) -> tuple[Array, Array]:
-        """Return the chance of each level (n,), kept off 0 and 1, and its derivatives by the first four (n, 4)."""
+        """Return each level's probability (n,), clipped off 0 and 1, and its derivatives by the first four (n, 4)."""
         pse, slope, order, lapse, _ = parameters.tolist()
         offset = self.x - pse + order * self.orders
         eta = slope * offset
@@ -235,7 +235,7 @@ class _ProfileLikelihood:
     def _log_likelihood(self, parameters: Array) -> tuple[float, Array]:
         """Return the beta-binomial log likelihood without its coefficient, and its derivatives (5,).
 
-        With theta 0 it is the binomial one (Griffiths 1973, Biometrics 29, 637).
+        With theta 0 it is binomial (Griffiths 1973, Biometrics 29, 637).
         """
         p, slopes = self.chances(parameters)
         theta = float(parameters[_SCATTER])
@@ -249,7 +249,7 @@ class _ProfileLikelihood:
     def _adjustment(self, theta: float) -> tuple[float, float]:
         """Return the Cox-Reid adjustment of the log likelihood for the fitted parameters, and its derivative by theta.
 
-        n answers to a level hold as much information as n (1 + theta) / (1 + n theta) independent ones.
+        n answers at a level have the information of n (1 + theta) / (1 + n theta) independent ones.
         """
         inflation = 1.0 + self.n * theta
         independent = self.n * (1.0 + theta) / inflation
@@ -259,7 +259,7 @@ class _ProfileLikelihood:
 
 
 def _jnd(slope: IntervalEstimate, steepest: float, reach: float) -> IntervalEstimate:
-    """Return the JND that a slope of either sign makes: 0 where it may be a step, without a bound beyond the reach."""
+    """Return the JND of a slope of either sign: 0 where it may be a step, unbounded beyond the reach."""
     steeper, flatter = (slope.high, slope.low) if slope.value > 0.0 else (slope.low, slope.high)
     flat = flatter is None or flatter * slope.value <= 0.0 or abs(flatter) * reach < QUARTILE
     slopes = (math.inf if steeper is None else abs(steeper), abs(slope.value))
@@ -273,7 +273,7 @@ def _correlation(scatter: IntervalEstimate) -> IntervalEstimate:
     return IntervalEstimate(scatter.value / (1.0 + scatter.value), low, high)
 
 
-# One answer: its session, the standard's index, the pair in the order it was stroked, and "first" or "second" chosen
+# One answer: session, the standard's index, the pair in order of stroking, and "first" or "second" chosen
 Comparison = tuple[str, int, tuple[int, int], str]
 
 
@@ -281,7 +281,7 @@ def function_of(answers: Sequence[Comparison], friction: Mapping[tuple[str, int]
     """Return the psychometric function of one subject.
 
     `friction` holds the µ of each stroke by session and index; a surface's is their geometric mean. Answers count where
-    both surfaces have one. Answers of one session to one surface in one order make a level.
+    both surfaces have a µ. A level is the answers of one session to one surface in one order.
     """
     log_mu = {key: float(np.mean(np.log(values))) for key, values in friction.items() if values}
     levels = by_key(

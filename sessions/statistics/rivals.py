@@ -1,4 +1,4 @@
-"""How scores correlate with other quantities of the model, and with friction, forces and speed of the strokes."""
+"""Correlations of scores with all quantities of the model, and with friction, forces and speed of the strokes."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -25,11 +25,11 @@ from sessions.statistics.mixed_model import akaike_weights, crossed_deviance
 from sessions.statistics.scores import by_key, surface_means
 from sessions.statistics.within_subjects import repeated_correlation
 
-MODEL_SED = SED.label  # the published quantity, to which the others are compared where no other is named
+MODEL_SED = SED.label  # the published quantity, the default for comparisons
 MODEL_MU = "µ of the model"
-# Name for people, and that of the model's quantities at the receptor.
+# Label, and name of the model's quantity at the receptor.
 RESPONSES: Mapping[str, str] = {quantity.label: quantity.name for quantity in BY_NAME.values()}
-# Name for people, and the field of a stroke or trial that holds it.
+# Label, and field of a stroke or trial.
 STROKE_FIELDS: Mapping[str, str] = {
     MODEL_MU: "mu",
     "µ dynamic": "mu_dynamic",
@@ -45,28 +45,28 @@ _NO_LINE = "without one of the surfaces the others do not determine a line"
 
 @dataclass(frozen=True, slots=True)
 class Rival:
-    """The correlation of one quantity with the scores. A number is None where `reasons` says why under its name."""
+    """The correlation of one quantity with the scores. A number is None where `reasons` says why, by its name."""
 
     name: str
-    n: int  # surfaces, or within subjects trials, that have it and a score
+    n: int  # surfaces, or within subjects trials, with the quantity and a score
     r: float | None
     low: float | None  # 95 % interval: Fisher's z; within subjects the jackknife's over subjects
     high: float | None
     contrast: Contrast | None = None  # the model's r less this one
-    partial: float | None = None  # r given the µ that the model got
-    partial_low: float | None = None  # 95 % interval: Fisher's z; within subjects the jackknife of it
+    partial: float | None = None  # r given the µ of the model
+    partial_low: float | None = None  # 95 % interval: Fisher's z; within subjects the jackknife of z
     partial_high: float | None = None
-    # Of a surface's scores by the line through the others, root mean square [points]
+    # Root mean square error of a surface's scores by the line through the others [points]
     left_out_error: float | None = None
     weight: float | None = None  # Akaike's, of the mixed model with subjects and surfaces crossed
-    same_order: bool | None = None  # orders the surfaces as the model's quantity does, or in exactly the reverse order
-    needed: int | None = None  # surfaces with which Steiger's test would distinguish the two correlations of means
+    same_order: bool | None = None  # orders the surfaces as the model's quantity, or exactly in reverse
+    needed: int | None = None  # surfaces needed by Steiger's test to distinguish the two correlations of means
     reasons: dict[str, str] = field(default_factory=dict[str, str])
 
 
 @dataclass(frozen=True, slots=True)
 class RivalTrial:
-    """One scored trial of a study, with those quantities of its stroke that there are."""
+    """One scored trial of a study, with the available quantities of its stroke."""
 
     subject: str
     index: int
@@ -77,9 +77,9 @@ class RivalTrial:
 def rivals_of_means(
     scores: Mapping[int, float], series: Mapping[str, Mapping[int, float]], model: str = MODEL_SED
 ) -> tuple[Rival, ...]:
-    """Return how each quantity of the surfaces correlates with their mean scores; () where there is no `model`.
+    """Return the correlation of each quantity of the surfaces with mean scores; () without `model`.
 
-    `scores` and each of `series`, named as in `RIVAL_NAMES`, go by index. All are compared to `model`, which is first.
+    `scores` and each of `series`, named as in `RIVAL_NAMES`, are by index. All are compared to `model`, which is first.
     """
     if model not in series:
         return ()
@@ -87,7 +87,7 @@ def rivals_of_means(
 
 
 def rivals_of_surfaces(trials: Sequence[RivalTrial], model: str = MODEL_SED) -> tuple[Rival, ...]:
-    """Return `rivals_of_means` of means over subjects, of the trials that have the model's quantity."""
+    """Return `rivals_of_means` for means over subjects of trials that have the model's quantity."""
     model_trials = [trial for trial in trials if model in trial.values]
 
     def means(value: Callable[[RivalTrial], float | None]) -> Mapping[int, float]:
@@ -100,10 +100,10 @@ def rivals_of_surfaces(trials: Sequence[RivalTrial], model: str = MODEL_SED) -> 
 
 
 def rivals_within(trials: Sequence[RivalTrial], model: str = MODEL_SED) -> tuple[Rival, ...]:
-    """Return how each quantity correlates with the scores within subjects; () where no trial has `model`.
+    """Return the correlation of each quantity with scores within subjects; () where no trial has `model`.
 
-    Differences and partial correlations have the jackknife's intervals over subjects: those of other people on these
-    surfaces. How many surfaces a test needs is given for the means over subjects.
+    Differences and partial correlations have jackknife intervals over subjects, valid for other subjects on these
+    surfaces. The number of surfaces that a test needs is given for means over subjects only.
     """
     model_trials = [trial for trial in trials if model in trial.values]
     names = [name for name in _model_first(model) if any(name in trial.values for trial in model_trials)]
@@ -198,9 +198,9 @@ def _within(name: str, model: str, trials: Sequence[RivalTrial]) -> Rival:
 
 
 def _covariances(trials: Sequence[RivalTrial], names: Sequence[str]) -> Array | None:
-    """Return covariances within subjects of score and quantities (1 + k, c, c): of all k, then without each of them.
+    """Return covariances within subjects of score and quantities (1 + k, c, c): with all k subjects, then without each.
 
-    A subject with a single trial does not vary and is left out. None where too few subjects are left.
+    A subject with a single trial does not vary and is left out. None with too few subjects.
     """
     rows = by_key((trial.subject, [trial.score, *(trial.values[name] for name in names)]) for trial in trials)
     columns = [np.array(table) for table in rows.values() if len(table) > 1]
@@ -221,12 +221,12 @@ def _correlations(covariances: Array, first: int, second: int) -> Array:
 
 
 def _finite_or_none(*numbers: Array) -> list[float | None]:
-    """Return numbers, None for each that is not known."""
+    """Return numbers, None for each that is not finite."""
     return [float(number) if math.isfinite(number) else None for number in numbers]
 
 
 def _leave_surface_out_error(trials: Sequence[RivalTrial], name: str) -> float | None:
-    """Return the error of each surface's scores by levels of subjects and one slope, fitted to the other surfaces."""
+    """Return the error of predicted scores of each surface, by levels and one slope fitted to the other surfaces."""
     subjects, members = np.unique([trial.subject for trial in trials], return_inverse=True)
     surfaces = np.array([trial.index for trial in trials])
     x, y = np.array([trial.values[name] for trial in trials]), np.array([trial.score for trial in trials])
@@ -246,7 +246,7 @@ def _leave_surface_out_error(trials: Sequence[RivalTrial], name: str) -> float |
 
 
 def _deviance(name: str, trials: Sequence[RivalTrial]) -> float | str:
-    """Return the deviance of the mixed model on a quantity, or why it has none that compares."""
+    """Return the deviance of the mixed model on a quantity, or why it has no comparable one."""
     lack = sum(name not in trial.values for trial in trials)
     if lack:
         return f"{lack} of {len(trials)} trials have no such number, and AIC compares models of the same scores"
@@ -259,5 +259,5 @@ def _deviance(name: str, trials: Sequence[RivalTrial]) -> float | str:
 
 
 def _because(rival: Rival, **reasons: str | None) -> Rival:
-    """Return the rival with why it lacks a number, under the name of the field."""
+    """Return the rival with reasons for missing numbers, by the name of the field."""
     return replace(rival, reasons=rival.reasons | {name: text for name, text in reasons.items() if text is not None})

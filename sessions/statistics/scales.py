@@ -1,18 +1,18 @@
-"""Scales of what subjects answered otherwise than on a line, and all their judgements on one latent scale.
+"""Scales of choices and magnitude estimates, and all kinds of judgement on one latent scale.
 
 Choices between two have Bradley and Terry's scale, and Thurstone's case V, with an advantage of the first. Both are
-generalised linear models of who was chosen: the difference of two values, and what coming first adds, go through a
+generalised linear models of the choice: the difference of two values plus the advantage of the first, through a
 logistic or a normal distribution function (Bradley and Terry 1952, Biometrika 39, 324; Thurstone 1927, Psychol. Rev.
-34, 273). Fitted by maximum likelihood, with Fisher's scoring.
+34, 273). They are fitted by maximum likelihood with Fisher scoring.
 
 Magnitude estimates have the exponent of Stevens' law: log answer = level of the subject + exponent log magnitude (1957,
-Psychol. Rev. 64, 153). What was measured errs too, which makes a plain slope too flat; Deming's slope (1943) allows for
+Psychol. Rev. 64, 153). Errors of the magnitude flatten an ordinary slope; Deming's slope (1943) allows for
 both errors by the ratio of their variances.
 
-The latent scale has Thurstone's unit, the standard deviation of the difference of two judgements: in his case V a
-difference z of two surfaces is judged right in Φ(z) of choices. A score, or the logarithm of an estimate, is such a
-judgement. With levels of the subjects taken away, single ones scatter by s, and the unit is √2 s. A comparison with a
-standard has its unit in the just noticeable difference: from there to the standard it is 0.674.
+The latent scale has Thurstone's unit, the standard deviation of the difference of two judgements: in case V two
+surfaces z apart are judged correctly in Φ(z) of choices. A score, or the logarithm of an estimate, is such a judgement.
+Without levels of subjects, single judgements scatter by s, and the unit is √2 s. Comparisons with a standard have their
+unit from the just noticeable difference, which is 0.674.
 """
 
 import math
@@ -34,7 +34,7 @@ from sessions.statistics.scores import IntervalEstimate, by_key
 Model = Literal["Bradley–Terry", "Thurstone V"]
 MODELS: tuple[Model, ...] = ("Bradley–Terry", "Thurstone V")
 
-_STEPS = 50  # of Fisher's scoring, which takes five
+_STEPS = 50  # of Fisher scoring, which takes five
 _GOOD = 1e-10
 
 
@@ -50,32 +50,32 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class PairedScale:
-    """The scale of one set of choices. There are no values where `reason` says why."""
+    """The scale of one set of choices. Without values `reason` says why."""
 
     model: Model
     choices: int
     subjects: int
     # By index, with mean 0, in logits or z
     values: Mapping[int, IntervalEstimate] = field(default_factory=dict[int, IntervalEstimate])
-    first: IntervalEstimate | None = None  # what coming first adds, in the same unit
-    deviance: float | None = None  # against a model with a chance of its own for every ordered pair
+    first: IntervalEstimate | None = None  # advantage of coming first, in the same unit
+    deviance: float | None = None  # against a separate probability for every ordered pair
     freedom: int | None = None  # degrees of freedom of that deviance
-    p: float | None = None  # of so large a deviance, by chi squared; too small where pairs were met a few times
+    p: float | None = None  # of that deviance, by chi squared; too small where pairs were met only a few times
     reason: str = ""
     interval_reason: str = ""  # why the values have no intervals
 
 
 @dataclass(frozen=True, slots=True)
 class Consistence:
-    """How far one subject's choices agree with one order of the surfaces (Kendall and Babington Smith 1940)."""
+    """Agreement of one subject's choices with a single order of the surfaces (Kendall and Babington Smith 1940)."""
 
     triads: int  # circular ones: a before b before c before a
-    most: int  # that there could be
-    zeta: float  # 1 less their ratio: 1 is an order, 0 as many circles as there can be
+    most: int  # greatest possible number
+    zeta: float  # 1 - triads / most: 1 is a perfect order
 
 
 def paired_scale(choices: Sequence[Choice], model: Model = "Bradley–Terry") -> PairedScale:
-    """Return the scale of choices, with the jackknife's intervals over subjects."""
+    """Return the scale of choices, with jackknife intervals over subjects."""
     indices = sorted({index for choice in choices for index in (choice.first, choice.second)})
     subjects = sorted({choice.subject for choice in choices})
     none = PairedScale(model, len(choices), len(subjects))
@@ -103,14 +103,14 @@ def paired_scale(choices: Sequence[Choice], model: Model = "Bradley–Terry") ->
 
 
 def consistence(choices: Sequence[Choice]) -> Mapping[str, Consistence]:
-    """Return the circular triads of each subject who compared every pair; a pair met often counts by its majority.
+    """Return the circular triads of each subject who compared every pair; a repeated pair counts by its majority.
 
-    A pair chosen equally often both ways leaves its subject out, for it has no direction.
+    A subject with a tied pair is left out.
     """
     results: dict[str, Consistence] = {}
     pairs = ((c.subject, (c.first, c.second) if c.first_chosen else (c.second, c.first)) for c in choices)
     for subject, answers in sorted(by_key(pairs).items()):
-        won = Counter(answers)  # by the surface that was chosen and the other
+        won = Counter(answers)  # by (chosen surface, other surface)
         indices = sorted({index for pair in won for index in pair})
         leads = {pair: won[pair] - won[pair[::-1]] for pair in combinations(indices, 2)}
         if len(indices) < 3 or not all(leads.values()):
@@ -124,7 +124,7 @@ def consistence(choices: Sequence[Choice]) -> Mapping[str, Consistence]:
 
 
 def _counts(choices: Sequence[Choice], indices: Sequence[int], subjects: Sequence[str]) -> Array:
-    """Return how often each subject met each ordered pair, and chose its first (s, 2, n, n)."""
+    """Return how often each subject met each ordered pair, and chose the first (s, 2, n, n)."""
     counts = np.zeros((len(subjects), 2, len(indices), len(indices)))
     for choice in choices:
         cell = counts[subjects.index(choice.subject), :, indices.index(choice.first), indices.index(choice.second)]
@@ -133,11 +133,11 @@ def _counts(choices: Sequence[Choice], indices: Sequence[int], subjects: Sequenc
 
 
 def _no_scale(counts: Array, indices: Sequence[int]) -> str:
-    """Return why there are no values, "" where they are finite (Ford 1957, Am. Math. Mon. 64(8), 28)."""
+    """Return why values are not finite, "" where they are (Ford 1957, Am. Math. Mon. 64(8), 28)."""
     from scipy.sparse.csgraph import connected_components  # slow to load, and an opened session has no need of it
 
     meetings, wins = counts
-    beaten = wins + (meetings - wins).T  # [a, b]: how often a was chosen and b was not
+    beaten = wins + (meetings - wins).T  # [a, b]: how often a was chosen over b
     groups, label = connected_components(beaten > 0, directed=True, connection="strong")
     if groups > 1:
         unbeaten = next(group for group in range(groups) if not (beaten[label != group][:, label == group] > 0).any())
@@ -149,7 +149,7 @@ def _no_scale(counts: Array, indices: Sequence[int]) -> str:
 
 
 def _design(count: int) -> Array:
-    """Return what makes differences (n, n, n) of n - 1 values, the last 0, and the first's advantage."""
+    """Return the design (n, n, n) of differences of values, the last value 0, and of the first's advantage."""
     unit = np.concatenate([np.eye(count)[:, : count - 1], np.zeros((count, 1))], axis=1)
     differences = unit[:, None, :] - unit[None, :, :]
     differences[:, :, -1] = 1.0
@@ -157,7 +157,7 @@ def _design(count: int) -> Array:
 
 
 def _chances(eta: Array, model: Model) -> tuple[Array, Array]:
-    """Return the chance that the first is chosen, and its slope."""
+    """Return the probability that the first is chosen, and its derivative."""
     if model == "Bradley–Terry":
         chance = np.asarray(special.expit(eta), np.float64)
         return chance, chance * (1.0 - chance)
@@ -165,7 +165,7 @@ def _chances(eta: Array, model: Model) -> tuple[Array, Array]:
 
 
 def _fit(counts: Array, model: Model, start: Array | None = None) -> Array | None:
-    """Return the values about their mean and then the first's advantage (n + 1,); None without a finite maximum."""
+    """Return the centred values and the first's advantage (n + 1,); None without a finite maximum."""
     meetings, wins = counts
     pairs = meetings > 0
     x, n, y = _design(len(meetings))[pairs], meetings[pairs], wins[pairs]
@@ -191,7 +191,7 @@ def _fit(counts: Array, model: Model, start: Array | None = None) -> Array | Non
 
 
 def _without_each(counts: Array, model: Model, start: Array) -> tuple[Array, str]:
-    """Return the fits without each subject (s, n + 1), and why they make no interval, "" where they do."""
+    """Return the fits without each subject (s, n + 1), and why they give no interval, "" where they do."""
     if len(counts) < LEAST_CASES:
         return np.zeros((0, 0)), f"an interval over subjects takes {LEAST_CASES} of them"
     indices, totals = range(counts.shape[2]), counts.sum(axis=0) - counts
@@ -203,14 +203,14 @@ def _without_each(counts: Array, model: Model, start: Array) -> tuple[Array, str
 
 
 def _estimates(estimates: Array, replicates: Array) -> list[IntervalEstimate]:
-    """Return `estimates` (m,) with the jackknife's intervals, from those without each of k >= 0 subjects (k, m)."""
+    """Return `estimates` (m,) with jackknife intervals, from estimates without each of k >= 0 subjects (k, m)."""
     low, high, _ = jackknife(estimates, replicates) if len(replicates) else np.full((3, len(estimates)), np.nan)
     columns = zip(estimates.tolist(), low.tolist(), high.tolist(), strict=True)
     return [IntervalEstimate(value, *(pair if math.isfinite(pair[0]) else (None, None))) for value, *pair in columns]
 
 
 def _deviance(counts: Array, fitted: Array, model: Model) -> tuple[float, int]:
-    """Return the deviance of a fit from a chance of its own for every ordered pair, and its degrees of freedom."""
+    """Return the deviance of a fit from separate probabilities for ordered pairs, and its degrees of freedom."""
     meetings, wins = counts
     eta = fitted[:-1, None] - fitted[None, :-1] + fitted[-1]
     pairs = meetings > 0
@@ -223,23 +223,23 @@ NAME = "log magnitude"
 
 @dataclass(frozen=True, slots=True)
 class Exponent:
-    """Stevens' exponent, by two routes. None where `reason` says why."""
+    """Stevens' exponent, by two methods. None where `reason` says why."""
 
     subjects: int
     trials: int
-    plain: Term | None  # slope of the mixed model, the magnitude taken as exact
-    # Deming's slope through the surfaces, and its 95 % interval; None of subjects who are all alike
+    plain: Term | None  # slope of the mixed model, with exact magnitudes
+    # Deming's slope through the surfaces, and its 95 % interval; None for identical subjects
     deming: tuple[float, float | None, float | None] | None = None
-    error_ratio: float | None = None  # variance of a surface's log answer by that of its log magnitude [-]
+    error_ratio: float | None = None  # error variance of a surface's log answer over that of its log magnitude [-]
     reason: str = ""
 
 
 def stevens_exponent(
     subjects: Sequence[str], surfaces: Sequence[int], answers: Sequence[float], magnitudes: Sequence[float]
 ) -> Exponent:
-    """Return the exponent of answers (n,) by magnitudes (n,), both above 0, in trials of subjects and surfaces (n,).
+    """Return the exponent of answers (n,) on magnitudes (n,), both above 0, in trials of subjects and surfaces (n,).
 
-    The interval of Deming's slope is the jackknife's over subjects. Others must have left out what is not above 0.
+    The interval of Deming's slope is from the jackknife over subjects. The caller leaves out values not above 0.
     """
     y, x = np.log(np.asarray(answers, np.float64)), np.log(np.asarray(magnitudes, np.float64))
     result = Exponent(len(set(subjects)), len(y), None)
@@ -265,7 +265,7 @@ def stevens_exponent(
 
 
 def _cells(subjects: Sequence[str], surfaces: Sequence[int], y: Array, x: Array) -> Array | None:
-    """Return log answers and magnitudes (s, k, 2), each subject's mean taken away; None where a cell is empty."""
+    """Return log answers and magnitudes (s, k, 2), without each subject's mean; None where a cell is empty."""
     answers = by_key(zip(zip(subjects, surfaces, strict=True), zip(y.tolist(), x.tolist(), strict=True), strict=True))
     people, indices = sorted(set(subjects)), sorted(set(surfaces))
     if len(answers) < len(people) * len(indices):
@@ -277,7 +277,7 @@ def _cells(subjects: Sequence[str], surfaces: Sequence[int], y: Array, x: Array)
 def _deming(cells: Array) -> tuple[float, float] | None:
     """Return Deming's slope through surfaces' means, and the ratio of error variances; None where nothing varies.
 
-    The errors are what subjects differ by on one surface, levels taken away.
+    Errors are the differences between subjects on a surface, without their levels.
     """
     means = cells.mean(axis=0)
     errors = cells - means
@@ -298,8 +298,8 @@ JUDGEMENTS: tuple[Judgement, ...] = ("scores", "estimates", "choices", "comparis
 def latent_judgements(points: Sequence[tuple[str, int, float]]) -> Mapping[int, IntervalEstimate]:
     """Return the latent value of each surface, with mean 0, from subject, index and score or log estimate.
 
-    Intervals are the jackknife's over subjects. Subjects who missed a surface that another judged do not count. Nothing
-    for fewer than three others, fewer than two surfaces, or without residuals, which give the unit.
+    Intervals are from the jackknife over subjects. Subjects who missed a surface that another judged do not count.
+    Empty for fewer than three other subjects, fewer than two surfaces, or without residuals, which give the unit.
     """
     by_subject = by_key((subject, (index, value)) for subject, index, value in points)
     indices = sorted({index for _, index, _ in points})
@@ -320,9 +320,9 @@ def latent_judgements(points: Sequence[tuple[str, int, float]]) -> Mapping[int, 
 
 
 def _latent_values(cells: Array, counts: Array, within: Array) -> Array:
-    """Return surfaces' means over s subjects by √2 s (k,); nan where nothing scatters about them.
+    """Return surfaces' means over subjects divided by √2 times the scatter (k,); nan without scatter.
 
-    `cells` (s, k) are means of repeats, each subject's own mean taken away; `counts` (s, k) are the repeats, and
+    `cells` (s, k) are means of repeats without each subject's mean; `counts` (s, k) are the repeats, and
     `within` (s,) is their sum of squares about the means.
     """
     means = cells.mean(axis=0)
@@ -332,9 +332,9 @@ def _latent_values(cells: Array, counts: Array, within: Array) -> Array:
 
 
 def latent_comparisons(mu: Mapping[int, float], log_jnd: tuple[float, float, float]) -> Mapping[int, IntervalEstimate]:
-    """Return the latent value of each surface, with mean 0, from its µ and the logarithm of the JND and of its ends.
+    """Return the latent value of each surface, with mean 0, from its µ and the logarithms of the JND and its ends.
 
-    The JND is a difference of log µ. The interval is the JND's: µ is taken as exact.
+    The JND is a difference of log µ. Intervals are from the JND alone: µ is taken as exact.
     """
     logs = {index: math.log(value) for index, value in mu.items()}
     middle = sum(logs.values()) / max(len(logs), 1)

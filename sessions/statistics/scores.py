@@ -13,14 +13,14 @@ from drivers.arrays import Array, Indices
 from sessions.recording import Recording, TrialRecord
 from sessions.statistics.correlations import TAILS, pearson, t_quantile
 
-SCORE_SCALE = (0.0, 100.0)  # ends of the scale, beyond which there is no answer
-_ALIKE = 1e-12  # of the greatest value: a spread so small is round-off
+SCORE_SCALE = (0.0, 100.0)  # ends of the scale, which limit answers
+_ALIKE = 1e-12  # relative to the greatest value: a smaller spread is round-off
 Key = TypeVar("Key", bound=Hashable)
 Value = TypeVar("Value")
 
 
 def by_key(pairs: Iterable[tuple[Key, Value]]) -> dict[Key, list[Value]]:
-    """Return the values of each key, keys in the order first met.
+    """Return the values of each key, keys in order of first occurrence.
 
     >>> by_key([("a", 1), ("b", 2), ("a", 3)])
     {'a': [1, 3], 'b': [2]}
@@ -38,7 +38,7 @@ def bounds(low: float | None, high: float | None) -> tuple[float, float] | None:
 
 @dataclass(frozen=True, slots=True)
 class IntervalEstimate:
-    """A value with its 95 % interval; None where the data set no bound, or too few subjects give one."""
+    """A value with its 95 % interval; an end is None where the data give no bound, or with too few subjects."""
 
     value: float
     low: float | None
@@ -54,10 +54,10 @@ class IntervalEstimate:
 class Average:
     """A mean over subjects."""
 
-    n: int  # subjects, each one's own repeats averaged first
+    n: int  # subjects, each one's repeats averaged first
     mean: float
-    sd: float | None  # between subjects; None of one alone
-    low: float | None  # 95 % t interval; None of one alone, and of several who are all alike
+    sd: float | None  # between subjects; None for a single subject
+    low: float | None  # 95 % t interval; None for a single subject, or identical values
     high: float | None
 
 
@@ -67,7 +67,7 @@ class Score:
 
     subject: str  # a code, never a name
     descriptor: str  # e.g. "stickiness"
-    index: int  # the stimulus' number on the descriptor
+    index: int  # the stimulus's number on the descriptor
     score: float  # 0 to 100
 
 
@@ -79,19 +79,19 @@ class ScoreTable:
     subject: str
     simulated: bool
     scores: tuple[Score, ...]  # answered trials only
-    other_answers: str = ""  # a sentence on those that are no scores on the line, and cannot be compared with them
+    other_answers: str = ""  # a sentence on answers other than on the line, which cannot be compared with scores
 
 
 @dataclass(frozen=True, slots=True)
 class MeanScore:
-    """What n subjects answered on one stimulus. A bound is None where `reason` says why."""
+    """Mean answer of n subjects to one stimulus. A bound is None where `reason` says why."""
 
     descriptor: str
     index: int
     n: int  # subjects, not trials
     mean: float
     sd: float | None  # standard deviation between subjects
-    low: float | None  # 95 % t interval of the mean, cut at the ends of the scale: the mean of all people lies on it
+    low: float | None  # 95 % t interval of the mean, clipped to the scale, which contains the population's mean
     high: float | None
     reason: str | None
 
@@ -108,7 +108,7 @@ def score_table(recording: Recording) -> ScoreTable:
 
 
 def _other_answers(recording: Recording) -> str:
-    """Return a sentence on the answers of a session that are no scores on the line; empty where there are none."""
+    """Return a sentence on the answers of a session other than scores on the line; empty without such answers."""
     numbers = sum(record.number is not None for record in recording.trials)
     choices = sum(record.choice is not None for record in recording.trials)
     if not numbers and not choices:
@@ -124,12 +124,12 @@ def _other_answers(recording: Recording) -> str:
 
 
 def distinct_sessions(tables: Iterable[ScoreTable]) -> tuple[ScoreTable, ...]:
-    """Return each session once, in the order first met."""
+    """Return each session once, in order of first occurrence."""
     return tuple(copies[0] for copies in by_key((table.session, table) for table in tables).values())
 
 
 def subject_scores(tables: Iterable[ScoreTable]) -> tuple[Score, ...]:
-    """Return one score a subject and stimulus: the mean of the subject's own repeats, over all its sessions.
+    """Return one score for each subject and stimulus: the mean of the subject's repeats over all its sessions.
 
     Trials are not subjects; pooling them would make intervals too narrow.
     """
@@ -140,9 +140,9 @@ def subject_scores(tables: Iterable[ScoreTable]) -> tuple[Score, ...]:
 
 
 def mean_scores(tables: Iterable[ScoreTable]) -> tuple[MeanScore, ...]:
-    """Return the mean over subjects of every stimulus, by descriptor (as first met) and index.
+    """Return the mean over subjects of every stimulus, by descriptor (in order of first occurrence) and index.
 
-    Intervals are mean ± t(0.975, n - 1) s / sqrt(n), n the number of subjects, as far as they lie on the scale.
+    Intervals are mean ± t(0.975, n - 1) s / sqrt(n), n the number of subjects, clipped to the scale.
     """
     by_descriptor = by_key((score.descriptor, (score.index, score.score)) for score in subject_scores(tables))
     return tuple(
@@ -153,7 +153,7 @@ def mean_scores(tables: Iterable[ScoreTable]) -> tuple[MeanScore, ...]:
 
 
 def reversed_subjects(tables: Iterable[ScoreTable]) -> tuple[tuple[str, str, float], ...]:
-    """Return (subject, descriptor, r) of all whose scores fall as the index rises; nothing is turned round for them."""
+    """Return (subject, descriptor, r) where scores fall as the index rises; these scores are not reversed."""
     points = by_key(((score.subject, score.descriptor), (score.index, score.score)) for score in subject_scores(tables))
     correlations = ((key, pearson(*zip(*pairs, strict=True))) for key, pairs in points.items())
     return tuple((*key, r) for key, r in correlations if r is not None and r < 0)
@@ -167,7 +167,7 @@ def score_matrix(tables: Iterable[ScoreTable], descriptor: str) -> Mapping[str, 
 
 
 def average(values: Sequence[float]) -> Average | None:
-    """Return the mean of subjects' values with its 95 % t interval; None of none."""
+    """Return the mean of subjects' values with its 95 % t interval; None without values."""
     if not values:
         return None
     n, mean = len(values), float(np.mean(values))
@@ -198,7 +198,7 @@ def _mean(descriptor: str, index: int, values: Sequence[float]) -> MeanScore:
 
 
 def no_interval(mean: Average) -> str | None:
-    """Return why a mean has no interval; None where it has one."""
+    """Return why a mean has no interval; None if it has one."""
     if mean.low is not None:
         return None
     return "one subject alone has no interval" if mean.n == 1 else "no interval: subjects who are all alike tell none"
@@ -211,13 +211,12 @@ def indicator_columns(groups: Sequence[str] | Sequence[int] | Array | Indices) -
 
 
 def surface_means(points: Sequence[tuple[str, int, float]]) -> dict[int, float] | None:
-    """Return the mean of each surface from `points` of subject, index and number, subjects' own repeats averaged first.
+    """Return the mean of each surface from `points` of subject, index and number; repeats are averaged first.
 
-    A subject has a level of its own, and where some missed a surface the plain mean of the others would carry who they
-    are: level of subject and effect of surface are fitted together by least squares (means adjusted for unbalanced
-    blocks: Yates 1934, J. Am. Stat. Assoc. 29:51), and a surface's mean is that of all subjects. With every surface met
-    by all it is the plain mean. None of nothing, and where subjects who met some surfaces met none of the others:
-    nothing compares them.
+    Subjects differ in level, and where some missed a surface the plain mean of the others would depend on who they are.
+    Levels of subjects and effects of surfaces are therefore fitted together by least squares (means adjusted for
+    unbalanced blocks: Yates 1934, J. Am. Stat. Assoc. 29:51), and a surface's mean is over all subjects. With complete
+    data it is the plain mean. None without points, and where surfaces have no common subjects that connect them.
 
     >>> means = surface_means([("a", 0, 1.0), ("a", 50, 2.0), ("b", 0, 11.0)])
     >>> {index: round(mean, 9) for index, mean in means.items()}
@@ -239,9 +238,9 @@ def surface_means(points: Sequence[tuple[str, int, float]]) -> dict[int, float] 
 
 
 def grades_of(records: Iterable[TrialRecord]) -> dict[str, str]:
-    """Return a sentence for each descriptor that was pre-evaluated; none where nothing was.
+    """Return a sentence for each pre-evaluated descriptor.
 
-    The grading holds where the answers rise with the maker's number throughout. Raises Blinded while it is sealed.
+    The grading holds where answers rise with the maker's number throughout. Raises Blinded while the number is sealed.
     """
     judgements = by_key(
         (record.trial.stimulus.descriptor, (record.trial.stimulus.known_index, answer))

@@ -1,6 +1,6 @@
-"""One session's contribution to a study: a row a trial with scores, friction and prediction, and who is left out.
+"""One session's contribution to a study: rows of trials with score, friction and prediction, and excluded subjects.
 
-People keep decisions to leave a subject out in a file in the folder of the sessions.
+Decisions to exclude a subject are in a file in the folder of the sessions.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,7 +29,7 @@ EXCLUSIONS = "exclusions.toml"
 
 @dataclass(frozen=True, slots=True)
 class Exclusion:
-    """One decision: every visit of a subject stays out, or its scores and strokes on one descriptor."""
+    """One decision: all visits of a subject are excluded, or its scores and strokes on one descriptor."""
 
     subject: str
     why: str
@@ -44,42 +44,42 @@ class Exclusion:
 
 @dataclass(frozen=True, slots=True)
 class Exclusions:
-    """The file."""
+    """Content of `EXCLUSIONS`."""
 
     exclude: tuple[Exclusion, ...] = ()
 
 
 def exclusions_in(folder: Path) -> tuple[Exclusion, ...]:
-    """Return the decisions kept in a study's folder, none where there is no file. Raises SettingsError."""
+    """Return the decisions stored in a study's folder, none without a file. Raises SettingsError."""
     path = folder / EXCLUSIONS
     return load_toml(path, Exclusions).exclude if path.is_file() else ()
 
 
 def exclusion_of(exclusions: tuple[Exclusion, ...], subject: str, descriptor: str) -> Exclusion | None:
-    """Return the decision that excludes a subject's trials on a descriptor, None where there is none."""
+    """Return the decision that excludes a subject's trials on a descriptor, None without one."""
     of_subject = (exclusion for exclusion in exclusions if exclusion.subject == subject)
     return next((exclusion for exclusion in of_subject if exclusion.descriptor in ("", descriptor)), None)
 
 
-FORM = 12  # raised when a row holds something else: what was stored before is then computed anew
+FORM = 12  # version of rows; stored rows of another version are computed again
 NO_INTERVAL = "intervals of the SED were not asked for"
 
 
 @dataclass(frozen=True, slots=True)
 class VisitOptions:
-    """What is asked of each session of a study."""
+    """Options for the analysis of each session of a study."""
 
     prediction: PredictionOptions = field(default_factory=lambda: PredictionOptions(course="steady", intervals=True))
-    area: AreaLaw = FIXED  # by which tau_max is computed; the paths have areas of their own
-    # Many paths too, and at which strain: see `sessions.statistics.multiverse`
+    area: AreaLaw = FIXED  # for tau_max; paths have their own areas
+    # Whether to follow many paths, and at which strain: see `sessions.statistics.multiverse`
     paths: Literal["none", "small", "finite"] = "none"
-    gain_error: float | None = None  # of each axis of every transducer [-]; None: what was set for each session
-    quantity: str = SED.name  # that the paths hold
+    gain_error: float | None = None  # of each axis of every transducer [-]; None: the value set for each session
+    quantity: str = SED.name  # of the paths
 
 
 @dataclass(frozen=True, slots=True)
 class TrialRow:
-    """One trial, each field with its unit and meaning in tables. None where there is none; `why` says why no SED."""
+    """One trial, each field with its unit and meaning in tables. None where missing; `why` says why there is no SED."""
 
     trial: Annotated[int, Meaning("", "number of the trial in its session, from 1")]
     block: Annotated[str, Meaning("", "name of its block")]
@@ -135,36 +135,36 @@ class TrialRow:
         tuple[str, ...], Meaning("", "names of the flaws graded doubtful or worse, with blanks between")
     ] = ()
     why: Annotated[str, Meaning("", "why there is no SED")] = ""
-    paths: Values = ()  # a quantity along each of `sessions.statistics.multiverse.PATHS`, where they were asked for
+    paths: Values = ()  # a quantity along each of `sessions.statistics.multiverse.PATHS`, where requested
 
     def response(self, quantity: str) -> float | None:
-        """Return the model's quantity of that name [MPa or -]; None where it predicts nothing."""
+        """Return the model's quantity of that name [MPa or -]; None without a prediction."""
         return self.sed if quantity == SED.name else self.responses.get(quantity)
 
 
 @dataclass(frozen=True, slots=True)
 class Visit:
-    """What one session brings."""
+    """One session's contribution to a study."""
 
     session: str  # its folder's name
     subject: str
     protocol: str
-    simulated: str  # the sentence that heads whatever is made of it; "" for a real one
+    simulated: str  # the first sentence of every document made from it; "" for a real session
     forces: bool
     complete: bool
     rows: tuple[TrialRow, ...]
     losses: tuple[str, ...]
-    made_by: Mapping[str, str]  # versions
+    made_by: Mapping[str, str]  # versions of software
     sha256: str = ""  # of its `session.sqlite`
     content_sha256: str = ""  # of its plan, readings and events: the same in every copy and import
-    sealed: str = ""  # whether its predictions were sealed before its scores, "" where it predicts nothing
+    sealed: str = ""  # whether predictions were sealed before scores, "" without predictions
     decisions: tuple[str, ...] = ()  # of people about its strokes, in force
-    calibration: str = ""  # the calibration's uncertainty that its intervals hold, set or assumed
-    model: tuple[tuple[str, str, str], ...] = ()  # what was modelled: name, value, remark
+    calibration: str = ""  # uncertainty of the calibration in its intervals, set or assumed
+    model: tuple[tuple[str, str, str], ...] = ()  # facts about the model: name, value, remark
 
 
 def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, str]) -> Visit:
-    """Return what a session brings to a study: analysed, and predicted where it has forces.
+    """Return a session's visit: analysed, and with predictions where it has forces.
 
     Raises Blinded while the stimuli's key is sealed, RecordingError where the session cannot be read.
     """
@@ -187,7 +187,7 @@ def visit_from(
     paths: Mapping[int, Values],
     made_by: Mapping[str, str],
 ) -> Visit:
-    """Return what an analysed session says of its trials; `paths` holds a quantity of each along many paths.
+    """Return the visit of an analysed session; `paths` holds a quantity of each trial along many paths.
 
     Raises Blinded while the stimuli's key is sealed.
     """
@@ -220,7 +220,7 @@ def visit_from(
 
 
 def scores_of(visit: Visit, rows: Sequence[TrialRow]) -> ScoreTable:
-    """Return the scores that some of a visit's rows hold."""
+    """Return the scores in some rows of a visit."""
     scores = tuple(Score(visit.subject, row.descriptor, row.index, row.score) for row in rows if row.score is not None)
     return ScoreTable(visit.session, visit.subject, bool(visit.simulated), scores)
 

@@ -1,4 +1,4 @@
-"""Statistics within subjects, without their levels: intervals, correlations, agreement and differences."""
+"""Statistics within subjects, independent of their levels: intervals, correlations, agreement and differences."""
 
 import itertools
 import math
@@ -12,7 +12,7 @@ from drivers.arrays import Array
 from sessions.statistics.correlations import LEAST_CASES, jackknife, t_quantile
 from sessions.statistics.scores import average, bounds
 
-Table = Mapping[str, Mapping[int, float]]  # subject -> stimulus' index -> score, as `scores.score_matrix` gives it
+Table = Mapping[str, Mapping[int, float]]  # subject -> the stimulus's index -> score, from `scores.score_matrix`
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,27 +22,27 @@ class WithinMean:
     index: int
     n: int  # subjects who scored every stimulus
     mean: float
-    low: float | None  # None where all subjects differ alike between stimuli
+    low: float | None  # None where all subjects have equal differences between stimuli
     high: float | None
 
 
 @dataclass(frozen=True, slots=True)
 class RepeatedCorrelation:
-    """The relation of y to x within subjects, the same slope for all (Bakdash & Marusich 2017)."""
+    """The relation of y to x within subjects, with the same slope for all (Bakdash & Marusich 2017)."""
 
     r: float
-    low: float  # 95 % interval by Fisher's z, for `dof` degrees of freedom: for pairs that are all drawn anew
+    low: float  # 95 % interval by Fisher's z, for `dof` degrees of freedom: for independent pairs
     high: float
-    p: float  # two-sided, of the same
+    p: float  # two-sided, for independent pairs
     dof: int  # N - k - 1 for N pairs from k subjects
-    subjects: int  # with two pairs or more: one alone has no variation within its subject
+    subjects: int  # with at least two pairs: a single pair has no variation within its subject
     people: tuple[float, float] | None  # 95 % interval for other such subjects who meet the same stimuli
-    people_p: float | None  # two-sided, of the same; None as it is of two subjects, of some all alike, and of r = ±1
+    people_p: float | None  # two-sided, as for `people`; both None for two or identical subjects, and for r = ±1
 
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """How far subjects order the stimuli alike."""
+    """Agreement of subjects on the order of the stimuli."""
 
     n: int  # subjects who scored every stimulus
     kendall_w: float  # 0 none, 1 the same order
@@ -60,8 +60,8 @@ def _complete(table: Table) -> tuple[list[int], Array]:
 def within_means(table: Table) -> tuple[WithinMean, ...]:
     """Return each stimulus' mean with the 95 % interval within subjects (Cousineau 2005, corrected by Morey 2008).
 
-    Each subject's own mean is exchanged for the mean of all, and the variance multiplied by C / (C - 1) for C stimuli.
-    These intervals are for comparing stimuli; they say nothing of the mean's own uncertainty. Only subjects who scored
+    Each subject's mean is replaced by the grand mean, and the variance multiplied by C / (C - 1) for C stimuli.
+    These intervals are for comparing stimuli; they do not show the mean's uncertainty. Only subjects who scored
     every stimulus count. Empty for fewer than two of them or of stimuli.
     """
     indices, scores = _complete(table)
@@ -81,12 +81,11 @@ def within_means(table: Table) -> tuple[WithinMean, ...]:
 def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequence[float]) -> RepeatedCorrelation | None:
     """Return the repeated-measures correlation of pairs (N), each with its subject; None where it has no value.
 
-    It is the correlation of what is left of x and y when each subject's own means are taken away, tested with
-    N - k - 1 degrees of freedom (Bland & Altman 1995; Bakdash & Marusich 2017, Front. Psychol. 8:456). Their interval
-    takes every pair for a draw of its own. Subjects who all meet the same stimuli share how y bends against x there,
-    and that is no chance: `people` leaves out each subject of two pairs or more in turn (Tukey's jackknife of Fisher's
-    z, t with one degree of freedom less than such subjects: Miller 1974, Biometrika 61:1). Neither is for other
-    stimuli, where these are few and shared.
+    It is the correlation of x and y after subtracting each subject's means, tested with N - k - 1 degrees of freedom
+    (Bland & Altman 1995; Bakdash & Marusich 2017, Front. Psychol. 8:456). That interval assumes independent pairs.
+    Subjects who all meet the same stimuli share the nonlinearity of y in x, which is not random: `people` leaves out
+    each subject with at least two pairs in turn (Tukey's jackknife of Fisher's z, t with one degree of freedom fewer
+    than such subjects: Miller 1974, Biometrika 61:1). Neither holds for other stimuli, where these are few and shared.
     """
     codes = np.unique(np.array(subjects), return_inverse=True)[1]
     dof = len(codes) - (int(codes.max()) + 1 if len(codes) else 0) - 1
@@ -113,9 +112,9 @@ def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequenc
 
 
 def _jackknife(xy: Array, xx: Array, yy: Array) -> tuple[tuple[float, float], float] | None:
-    """Return the jackknife's interval of r, and its p, from each subject's sums (k).
+    """Return the jackknife interval of r, and its p, from each subject's sums (k).
 
-    None of two subjects, of subjects who are all alike, or where r is ±1 without one of them.
+    None for two subjects, identical subjects, or where r is ±1 without one of them.
     """
     others_xy, size = xy.sum() - xy, np.sqrt((xx.sum() - xx) * (yy.sum() - yy))
     if len(xy) < LEAST_CASES or not (np.abs(others_xy) < (1.0 - 1e-12) * size).all():
@@ -126,7 +125,7 @@ def _jackknife(xy: Array, xx: Array, yy: Array) -> tuple[tuple[float, float], fl
 
 
 def agreement(table: Table) -> Agreement | None:
-    """Return how far subjects agree on the order; None for fewer than two subjects or three stimuli, or all ties."""
+    """Return subjects' agreement on the order; None for fewer than two subjects or three stimuli, or all ties."""
     scores = _complete(table)[1].round(9)  # means of repeats that tie differ by round-off
     n, stimuli = scores.shape
     if n < 2 or stimuli < 3 or np.all(np.ptp(scores, axis=1) == 0):
@@ -141,7 +140,7 @@ def agreement(table: Table) -> Agreement | None:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """How much higher one stimulus was scored than another, within subjects."""
+    """Mean difference of the scores of two stimuli, within subjects."""
 
     low_index: int
     high_index: int
@@ -150,11 +149,11 @@ class Difference:
     low: float  # 95 % t interval
     high: float
     p: float  # paired t test, two-sided
-    p_holm: float  # for all pairs together (Holm 1979, Scand. J. Stat. 6:65)
+    p_holm: float  # adjusted for the number of pairs (Holm 1979, Scand. J. Stat. 6:65)
 
 
 def differences(table: Table) -> tuple[Difference, ...]:
-    """Return the difference of each pair of stimuli, of the subjects who scored both; at least three of them."""
+    """Return the difference of each pair of stimuli, over at least three subjects who scored both."""
     rows: list[Difference] = []
     for lower, higher in itertools.combinations(sorted({index for row in table.values() for index in row}), 2):
         step = average([round(row[higher] - row[lower], 9) for row in table.values() if {lower, higher} <= row.keys()])
@@ -166,17 +165,17 @@ def differences(table: Table) -> tuple[Difference, ...]:
 
 
 def holm(ps: Sequence[float]) -> tuple[float, ...]:
-    """Return p values that allow for there being several (Holm 1979, Scand. J. Stat. 6:65)."""
+    """Return p values adjusted for multiple tests (Holm 1979, Scand. J. Stat. 6:65)."""
     order = np.argsort(ps, kind="stable")
     multiples = np.arange(len(ps), 0, -1) * np.array(ps, np.float64)[order]
     return tuple(np.maximum.accumulate(np.minimum(multiples, 1.0))[np.argsort(order)].tolist())
 
 
 def z_scores(table: Table) -> dict[str, dict[int, float]]:
-    """Return scores as each subject's own z-scores, which takes away the part of the scale a subject uses.
+    """Return each subject's z-scores, which remove differences in the use of the scale.
 
-    A subject whose scores do not vary is left out: it gave no order. So is one who did not
-    score every stimulus: its mean and spread are those of a part of the scale.
+    A subject whose scores do not vary is left out: it gave no order. So is one who did not score every stimulus: its
+    mean and spread are those of a part of the scale.
     """
     rows: dict[str, dict[int, float]] = {}
     stimuli = len({index for row in table.values() for index in row})
@@ -189,9 +188,9 @@ def z_scores(table: Table) -> dict[str, dict[int, float]]:
 
 
 def equal_moduli(logs: Table) -> dict[str, dict[int, float]]:
-    """Return logarithms of free-modulus estimates with one mean for all subjects, that of their own means.
+    """Return logarithms of free-modulus estimates, shifted so that all subjects have the grand mean.
 
-    With a free modulus each subject chooses its own unit (Stevens 1957, Psychol. Rev. 64:153).
+    With a free modulus each subject chooses a unit (Stevens 1957, Psychol. Rev. 64:153).
     """
     means = {subject: float(np.mean(list(row.values()))) for subject, row in logs.items()}
     grand = float(np.mean(list(means.values()))) if means else 0.0

@@ -26,13 +26,13 @@ Panels = Iterable[Panel | None]
 
 
 def plates(report: Report) -> tuple[Plate, ...]:
-    """Return the figures that a report has numbers for, in their order."""
+    """Return the figures of a report that have numbers, in order."""
     with look(simulated=report.simulated):
         return tuple(plate for plate in [_plate(report, name) for name in _PANELS] if plate.panels)
 
 
 def picture(report: Report, plate: str, experiment: str | None = None) -> Panel | None:
-    """Return the first panel of a plate, of one experiment where it is named; None where it has no numbers."""
+    """Return the first panel of a plate, of one experiment if named; None without numbers."""
     if experiment is not None:
         report = replace(
             report,
@@ -51,7 +51,7 @@ def _plate(report: Report, name: str) -> Plate:
 
 
 def _of_strokes(*quantities: StrokeQuantity) -> Callable[[Report], Panels]:
-    """Return what draws a panel for each quantity of the strokes of each experiment; those of none come last."""
+    """Return a function that draws a panel for each quantity and experiment; strokes without one come last."""
 
     def panels(report: Report) -> Panels:
         names = [experiment.name for experiment in report.experiments]

@@ -1,4 +1,4 @@
-"""What runs in time: forces of a recording, forces, friction and speed of its strokes, and predicted responses."""
+"""Time courses: forces of a recording, forces, friction and speed of its strokes, predicted responses."""
 
 # matplotlib does not type the keyword arguments it passes on.
 
@@ -56,14 +56,14 @@ def course_panel(course: Course, strokes: tuple[StrokeFinding, ...]) -> Panel:
 
 
 def _mark(axes: Axes, text: str, position: tuple[float, float], off: tuple[float, float], **look: Any) -> None:  # noqa: ANN401 - matplotlib's
-    """Write beside an instant and a share of the axes' height, `off` in points."""
+    """Write text at an instant and a share of the axes' height, with offset `off` in points."""
     axes.annotate(text, position, off, ("data", "axes fraction"), "offset points", **look)
 
 
 def _strokes_with_room(
     strokes: tuple[StrokeFinding, ...], begin: float, end: float
 ) -> list[tuple[StrokeFinding, float]]:
-    """Return the strokes whose number has room in the figure, each with its middle [s]."""
+    """Return the strokes with room for their number in the figure, each with its middle [s]."""
     room = 0.025 * (end - begin)
     with_room: list[tuple[StrokeFinding, float]] = []
     for stroke in strokes:
@@ -81,7 +81,7 @@ MOST_LABELLED = 12  # more curves in one picture cannot be distinguished by labe
 
 
 class StrokeQuantity(NamedTuple):
-    """What is drawn in the course of strokes."""
+    """A quantity drawn over the time of strokes."""
 
     name: str  # of its figure
     values: str  # its name in a trace, and in the title
@@ -103,7 +103,7 @@ SPEED_COURSE = StrokeQuantity(
 
 
 def stroke_panel(quantity: StrokeQuantity, strokes: Sequence[StrokeFinding], experiment: str) -> Panel | None:
-    """Return a quantity of an experiment's strokes since contact, None without curves; refused speeds stay out."""
+    """Return a quantity of an experiment's strokes since contact, None without curves; refused speeds are left out."""
     if quantity is SPEED_COURSE:
         strokes = [stroke for stroke in strokes if stroke.speed is not None]
     picture = sheet(328, 290)
@@ -126,7 +126,7 @@ Row = tuple[int, int | None, float, float, int]
 
 
 def _draw(picture: Sheet, quantity: StrokeQuantity, curves: Sequence[tuple[StrokeFinding, Trace]]) -> tuple[Row, ...]:
-    """Draw curves thin, thick in their steady windows, labelled at their steady level; return what was drawn."""
+    """Draw curves thin, thick in their steady windows, labelled at their steady level; return the rows drawn."""
     (axes,) = picture.axes
     in_order = sorted(curves, key=lambda c: (c[0].index is None, c[0].index or 0, c[0].number))
     rows: list[Row] = []
@@ -149,7 +149,7 @@ def _draw(picture: Sheet, quantity: StrokeQuantity, curves: Sequence[tuple[Strok
             point = float(trace.time[last_valid]), float(values[last_valid])
             labels.append(Label(str(stroke.number if stroke.index is None else stroke.index), *point))
     axes.set(xlabel="time since contact onset [s]", xlim=(0.0, max((t for _, _, t, _, _ in rows), default=1.0)))
-    if rows:  # from 0 on where nothing lies below
+    if rows:  # from 0 where no value is negative
         heights = [row[3] for row in rows]
         low, high = min(0.0, *heights), max(heights)
         axes.set_ylim(low - (0.03 * (high - low) if low < 0 else 0.0), high + 0.06 * (high - low))
@@ -162,7 +162,7 @@ PRESS_DURATION = 1.0  # the model presses for 1 s, then slides [s]
 
 
 def response_panel(predictions: Sequence[PredictionFinding], name: str) -> Panel | None:
-    """Return SED against time: the whole course above, sliding alone on its own scale below."""
+    """Return SED against time: the whole course above, sliding alone below on its own scale."""
     courses = sorted(
         ((p, p.history) for p in predictions if p.history is not None),
         key=lambda c: (c[0].index is None, c[0].index or 0, c[0].stroke or 0),
@@ -182,7 +182,7 @@ def response_panel(predictions: Sequence[PredictionFinding], name: str) -> Panel
         text = f"{label_kind} {label}: {kilopascal[-1]:.3f} kPa in the end"
         for axes in picture.axes:
             axes.plot(history.time, kilopascal, color=shade, linewidth=1.2, gid=picture.note(text))
-            if history.time[-1] < last_time:  # settled: it stays
+            if history.time[-1] < last_time:  # settled: constant
                 plateau = [history.time[-1], last_time], [kilopascal[-1]] * 2
                 axes.plot(*plateau, color=shade, linewidth=0.8, linestyle=(0, (2, 2)))
         labels.append(Label(label, last_time, float(kilopascal[-1])))

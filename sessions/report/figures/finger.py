@@ -15,7 +15,7 @@ from matplotlib.tri import Triangulation, TriContourSet
 from sessions.report.contents import Field
 from sessions.report.figures.style import GREY, INK, PALE, Panel, Sheet, rows_of, sheet
 
-# Perceptually uniform, darker for more, in the same order in grey; its black end is left to the lines.
+# Perceptually uniform, darker for greater values, also in grey; the black end is reserved for lines.
 _COLOURS = ListedColormap(colormaps["magma_r"](np.linspace(0.0, 0.8, 256)))
 LONGEST_ARROW = 1.5  # of the tractions in the picture [mm]
 _ARROWS = 22  # at most
@@ -63,10 +63,10 @@ def finger_panels(field: Field, levels: tuple[float, ...]) -> tuple[Panel, Panel
 
 
 def common_levels(fields: Sequence[Field]) -> tuple[float, ...]:
-    """Return the borders of the colours for all fields together [kPa]: few nodes, at bone and contact, lie above.
+    """Return the borders of the colours for all fields together [kPa]: few nodes, at bone and contact, are above.
 
-    They rise from 0 in steps of 1, 2 or 5 times a power of ten. Nodes without an SED (nan) count for nothing; where no
-    node has one above 0, the colours end at 1 kPa.
+    They rise from 0 in steps of 1, 2 or 5 times a power of ten. Nodes without an SED (nan) are ignored; if no node has
+    an SED above 0, the colours end at 1 kPa.
     """
     values = np.concatenate([field.finger.sed for field in fields]) * 1e3
     values = values[np.isfinite(values)]
@@ -78,9 +78,9 @@ def common_levels(fields: Sequence[Field]) -> tuple[float, ...]:
 
 
 def _tissue(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourSet | None:
-    """Fill the finger by its SED, outline layers, bone and ending, and draw the surface it rests on.
+    """Fill the finger by its SED, outline layers, bone and ending, and draw the surface below it.
 
-    Returns the filling; None where no triangle has an SED at all its corners, which the picture then says.
+    Return the filling; None, with a text in the picture, where no triangle has an SED at all corners.
     """
     contours = _draw_contours(axes, field, levels)
     for name, line in field.finger.outlines.items():
@@ -100,28 +100,28 @@ def _tissue(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourSe
 
 
 def _draw_contours(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourSet | None:
-    """Fill the triangles whose corners all have a finite SED; return None where there are none."""
+    """Fill the triangles whose corners all have a finite SED; return None without any."""
     nodes, sed, corners = field.finger.nodes, field.finger.sed * 1e3, field.finger.triangles
     without_sed = ~np.isfinite(sed[corners]).all(axis=1)
     if without_sed.all():
         return None
-    values = np.where(np.isfinite(sed), sed, 0.0)  # a node without an SED lies in no triangle that is drawn
+    values = np.where(np.isfinite(sed), sed, 0.0)  # a node without an SED is in no drawn triangle
     mesh = Triangulation(nodes[:, 0], nodes[:, 1], corners, mask=without_sed)
     contours = axes.tricontourf(mesh, values, levels=levels, cmap=_COLOURS, extend="max")
-    contours.set_edgecolor("face")  # else hairlines of the page show between the levels
+    contours.set_edgecolor("face")  # else hairlines of the background show between levels
     contours.set_linewidth(0.3)
     return contours
 
 
 def _name_layers(axes: Axes, field: Field) -> None:
-    """Write the layers' names beside the finger's back, each with a line into its layer, and the bone's on it."""
+    """Write the layers' names next to the finger's back with lines into the layers, and the bone's name on it."""
     outlines = field.finger.outlines
     if "bone" in outlines:
         x, y = outlines["bone"].mean(axis=0).tolist()
         axes.text(x, y, "bone", ha="center", va="center", clip_on=True)
     lines = [outlines[name] for name in ("skin", "epidermis", "dermis", "bone") if name in outlines]
     if len(lines) < 4 or len({len(line) for line in lines}) > 1:
-        return  # the outlines have no points in common that would lie across the layers
+        return  # the outlines have no corresponding points across the layers
     line = {"arrowstyle": "-", "color": INK, "linewidth": 0.4, "shrinkA": 1.0, "shrinkB": 0.0, "relpos": (0.0, 0.5)}
     for row, (name, outer, inner) in enumerate(zip(("epidermis", "dermis", "fat"), lines[:-1], lines[1:], strict=True)):
         index = int((0.88 - 0.04 * row) * len(outer))
@@ -135,7 +135,7 @@ def _middle(field: Field) -> float:
 
 
 def _tractions(picture: Sheet, field: Field) -> None:
-    """Draw what the surface does to the skin: arrows that end where it acts, and how each part of it moves."""
+    """Draw the surface's tractions on the skin as arrows that end at the skin, and the contact states."""
     axes, skin = picture.axes[0], field.skin
     contact_nodes = [i for i, state in enumerate(skin.state) if state != "open"]
     if not contact_nodes:
@@ -143,7 +143,7 @@ def _tractions(picture: Sheet, field: Field) -> None:
         return
     _states(axes, field)
     strongest = float(np.hypot(skin.pressure[contact_nodes], skin.traction[contact_nodes]).max())
-    if strongest == 0.0:  # it touches, and nothing presses yet
+    if strongest == 0.0:  # contact without load
         return
     scale = LONGEST_ARROW / strongest
     for i in contact_nodes[:: max(1, -(-len(contact_nodes) // _ARROWS))]:
@@ -158,7 +158,7 @@ def _tractions(picture: Sheet, field: Field) -> None:
 
 
 def _states(axes: Axes, field: Field) -> None:
-    """Draw a line under the surface for each stretch that slips or sticks, and name the stretches with room for it."""
+    """Draw a line under the surface for each stretch that slips or sticks, with its name where there is room."""
     states = field.skin.state
     for state, run in itertools.groupby(range(len(states)), key=lambda i: states[i]):
         if state == "open":
@@ -171,7 +171,7 @@ def _states(axes: Axes, field: Field) -> None:
 
 
 def _nice(value: float) -> float:
-    """Return the greatest of 1, 2 or 5 times a power of ten that is no greater than value.
+    """Return the greatest of 1, 2 or 5 times a power of ten that does not exceed `value`.
 
     >>> _nice(0.073)
     0.05

@@ -38,7 +38,7 @@ _TICKS = [0, 20, 40, 60, 80, 100]  # of a scale of scores
 
 
 def score_panel(findings: Experiment | DescriptorFindings) -> Panel | None:
-    """Return mean score against index, with 95 % t intervals and every subject's answer beside them; None of none."""
+    """Return mean score against index, with 95 % t intervals and all subjects' answers; None without scores."""
     if not findings.scores:
         return None
     name = findings.name if isinstance(findings, Experiment) else findings.descriptor
@@ -68,7 +68,7 @@ def score_panel(findings: Experiment | DescriptorFindings) -> Panel | None:
 
 
 def study_plates(study: StudyFindings) -> tuple[Plate, ...]:
-    """Return the figures a study has numbers for, in their order."""
+    """Return the figures of a study that have numbers, in order."""
     quantity = shown_response(study.response)
     caption_text = caption("figure-study-relation", label=quantity.label, model=study_model(study))
     relations = (_relation(findings, quantity) for findings in study.descriptors if findings.points)
@@ -82,13 +82,13 @@ def study_plates(study: StudyFindings) -> tuple[Plate, ...]:
     return tuple(plate for plate in plates if plate.panels)
 
 
-_MOST_HOVERING = 400  # points that tell their values each on their own
+_MOST_HOVERING = 400  # most points with their own values on hovering
 
 
 def _relation(findings: DescriptorFindings, quantity: ShownResponse) -> Panel:
     picture = sheet(328, 280)
     (axes,) = picture.axes
-    separate = len(findings.points) <= _MOST_HOVERING  # of more points only hovering names the subject
+    separate = len(findings.points) <= _MOST_HOVERING  # with more points hovering shows only the subject
     by_subject = by_key((subject, (quantity.factor * value, y, index)) for subject, index, value, y in findings.points)
     for subject, points in by_subject.items():
         dots = [x for x, _, _ in sorted(points)], [y for _, y, _ in sorted(points)]
@@ -121,7 +121,7 @@ def _relation(findings: DescriptorFindings, quantity: ShownResponse) -> Panel:
 
 
 def relation_panel(experiment: Experiment, predictions: Sequence[PredictionFinding]) -> Panel | None:
-    """Return the experiment's response against mean score with both errors, their line, r, its interval and n."""
+    """Return an experiment's response against mean score with both errors, the fitted line, r, its interval and n."""
     means = {mean.index: mean for mean in experiment.scores}
     quantity = shown_response(experiment.response)
     numbers_of = [(p, quantity.numbers(p)) for p in predictions]
@@ -171,7 +171,7 @@ def relation_panel(experiment: Experiment, predictions: Sequence[PredictionFindi
 
 
 def relation_title(experiment: Experiment) -> str:
-    """Return r with its interval and n, or why there is none, in few words."""
+    """Return r with its interval and n, or why there is none, in short."""
     relation = experiment.score_relation
     if relation is None or relation.pearson is None:
         return "no r: " + (relation.reason if relation is not None and relation.reason else "no scores")
@@ -182,7 +182,7 @@ def relation_title(experiment: Experiment) -> str:
 
 
 def _on_line(relation: Relation, score: float) -> float:
-    """Return the response of the least-squares line at a score; nan where there is no line."""
+    """Return the response of the least-squares line at a score; nan without a line."""
     if relation.slope is None or relation.intercept is None:
         return math.nan
     return relation.intercept + relation.slope * score
@@ -198,7 +198,7 @@ def _point(
     above: bool,
     rising: bool,
 ) -> None:
-    """Draw one stimulus with its errors, its index on the side away from the line."""
+    """Draw one stimulus with its errors and its index on the side away from the line."""
     axes = picture.axes[0]
     value = quantity.factor * numbers[0]
     text = f"index {mean.index}: score {mean.mean:.1f}, {quantity.label} {quantity.text(value)}"
@@ -219,7 +219,7 @@ _BINS = 24
 
 
 def paths_panel(descriptor: str, findings: Sequence[PathFinding], label: str) -> Panel | None:
-    """Return the distribution of the correlation of the quantity `label` over all paths; None where none has one."""
+    """Return the distribution of the correlation of the quantity `label` over all paths; None without any."""
     values = correlations(findings)
     numbers = [value for value in values if value is not None]
     if not numbers:
@@ -260,7 +260,7 @@ def paths_panel(descriptor: str, findings: Sequence[PathFinding], label: str) ->
 
 
 def _ends(values: Sequence[float]) -> tuple[float, float]:
-    """Return round ends of an axis that holds all values and shows their differences, within -1 to 1.
+    """Return round ends of an axis that contains all values and shows their differences, within -1 to 1.
 
     >>> _ends([0.93, 0.95])
     (0.9, 1.0)
@@ -278,7 +278,7 @@ Number = float | None
 def comparison_panel(
     names: Sequence[str], sessions: tuple[str, str], rows: Sequence[tuple[str, Sequence[tuple[Number, Number]]]]
 ) -> Panel | None:
-    """Return the picture of `rows`: stimuli, and both sessions' values of each of `names`; None where none has both."""
+    """Return the picture of `rows`: stimuli with both sessions' values of each of `names`; None without a pair."""
     if not any(None not in pair for _, pairs in rows for pair in pairs):
         return None
     picture = sheet(560, 150 * len(names) + 60, tuple(1.0 for _ in names), share_x=True)

@@ -1,4 +1,4 @@
-"""How all pictures look: palette (Okabe and Ito 2008), sizes, and SVG that is the same on every run and machine."""
+"""Style of all pictures: palette (Okabe and Ito 2008), sizes, and SVG that is identical on every run and machine."""
 
 # matplotlib does not type the keyword arguments it passes on.
 
@@ -31,19 +31,19 @@ GREY = "#767676"
 PALE = "#d9d9d9"
 
 _TEXT = 8.5  # [pt]
-_POINTS = 72.0  # in an inch: SVG is laid out in them
-DOTS = 220  # of a picture in pixels, in an inch
+_POINTS = 72.0  # per inch: the unit of SVG layout
+DOTS = 220  # per inch of a picture in pixels
 _PIXELS: ContextVar[dict[str, bytes] | None] = ContextVar("pixels", default=None)  # see `in_pixels`
-_NOTE: ContextVar[str] = ContextVar("note", default="")  # likewise
+_NOTE: ContextVar[str] = ContextVar("note", default="")  # see `in_pixels`
 _SIMULATED: ContextVar[bool] = ContextVar("simulated", default=False)  # see `look`
 _LOOK: dict[Any, Any] = {
     "font.family": "sans-serif",
-    # Text stays text, so that it can be searched, copied and read aloud. The layout is made for the first font, which
-    # is wider than the ones a reader without it sees instead: labels may come out shorter, never cut.
+    # Text stays text, so that it can be searched, copied and read aloud. The layout is for the first font, which is
+    # wider than its substitutes: labels may come out shorter, never cut.
     "font.sans-serif": ["DejaVu Sans"],
     "svg.fonttype": "none",
     "text.parse_math": False,  # a name may hold dollar signs
-    "text.hinting": "no_hinting",  # a reader's letters are no narrower for a coarse screen, as those laid out would be
+    "text.hinting": "no_hinting",  # hinting would narrow the letters of the layout, not the reader's
     "font.size": _TEXT,
     "axes.titlesize": _TEXT,
     "axes.titlelocation": "left",
@@ -76,7 +76,7 @@ Cell = str | float | int | None
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One picture, and the numbers it shows."""
+    """One picture and its numbers."""
 
     name: str  # of its files, without ending
     title: str  # read aloud, and shown on hovering
@@ -95,7 +95,7 @@ class Plate:
 
 
 def plate(name: str, caption: str, panels: Iterable[Panel | None]) -> Plate:
-    """Return a figure of those panels that there are."""
+    """Return a figure of the panels that are not None."""
     return Plate(name, caption, tuple(panel for panel in panels if panel is not None))
 
 
@@ -105,7 +105,7 @@ class Sheet:
 
     figure: Figure
     axes: tuple[Axes, ...]
-    hover: dict[str, str] = field(default_factory=dict[str, str])  # artist's gid: what hovering shows
+    hover: dict[str, str] = field(default_factory=dict[str, str])  # artist's gid -> text on hovering
     after_layout: list[Callable[[], None]] = field(default_factory=list[Callable[[], None]])
 
     def note(self, text: str) -> str:
@@ -115,13 +115,13 @@ class Sheet:
         return gid
 
     def panel(self, name: str, title: str, header: tuple[str, ...], rows: Iterable[tuple[Cell, ...]]) -> Panel:
-        """Return the picture as it is drawn, with the numbers it shows; inside `look`."""
+        """Return the finished picture with its numbers; call inside `look`."""
         return Panel(name, title, svg(self, name, title), header, tuple(rows))
 
 
 @contextmanager
 def look(*, simulated: bool = False) -> Generator[None]:
-    """Be the context every picture is drawn in; all in it say so where they show what was `simulated`."""
+    """Set the style of the pictures drawn inside; they are marked if `simulated`."""
     token = _SIMULATED.set(simulated)
     try:
         with mpl.rc_context(_LOOK):
@@ -145,7 +145,7 @@ def sheet(
 
 
 def shades(colour: str, n: int) -> tuple[str, ...]:
-    """Return n shades of a colour from light to dark, apart in grey as well.
+    """Return n shades of a colour from light to dark, distinct in grey too.
 
     >>> shades("#808080", 1)
     ('#808080',)
@@ -157,7 +157,7 @@ def shades(colour: str, n: int) -> tuple[str, ...]:
 
 @contextmanager
 def in_pixels(note: str = "") -> Generator[dict[str, bytes]]:
-    """Also draw every picture made meanwhile in pixels, with a `note` under it: yields PNGs by the pictures' names."""
+    """Also draw every picture made inside in pixels, with a `note` under it: yields PNGs by the pictures' names."""
     images: dict[str, bytes] = {}
     pixels_token, note_token = _PIXELS.set(images), _NOTE.set(note)
     try:
@@ -184,7 +184,7 @@ def svg(picture: Sheet, name: str, title: str) -> str:
         engine.execute(picture.figure)
     for draw in picture.after_layout:
         draw()
-    picture.figure.set_layout_engine(None)  # else it would be drawn once more, only to be laid out
+    picture.figure.set_layout_engine(None)  # else it would be drawn again for the layout
     buffer = io.StringIO()
     with mpl.rc_context({"svg.hashsalt": name}):
         picture.figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
@@ -221,7 +221,7 @@ LABEL_X = 1.04  # where labels begin, in widths of the axes
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """What to write at the right of a picture, and the point it belongs to."""
+    """A text at the right of a picture, and its point."""
 
     text: str
     x: float
@@ -229,7 +229,7 @@ class Label:
 
 
 def spread(targets: Sequence[float], gap: float, low: float, high: float) -> list[float]:
-    """Return positions at least `gap` apart, in the order of `targets` and near them, inside low..high where they fit.
+    """Return positions at least `gap` apart, in the order of `targets` and near them, within low..high if they fit.
 
     >>> spread([1.0, 1.0, 5.0], gap=1.0, low=0.0, high=10.0)
     [0.5, 1.5, 5.0]
@@ -239,7 +239,7 @@ def spread(targets: Sequence[float], gap: float, low: float, high: float) -> lis
         return []
     order = np.argsort(targets, kind="stable")
     steps = gap * np.arange(n)
-    # Without the steps, labels at least `gap` apart are numbers that do not fall.
+    # Less the steps, positions at least `gap` apart are a non-decreasing sequence.
     rising = isotonic_regression(np.asarray(targets)[order] - steps).x
     positions = np.empty(n)
     positions[order] = np.clip(rising, low, max(low, high - steps[-1])) + steps

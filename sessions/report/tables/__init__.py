@@ -1,4 +1,4 @@
-"""Tables of a report: cells, columns and notes, of a session as of a study."""
+"""Tables of a report of a session or a study: cells, columns and notes."""
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
@@ -9,13 +9,13 @@ from sessions.report.contents import Report
 from sessions.report.wording import NONE, between, caption, finer
 
 Finding = TypeVar("Finding")
-CAPTION_WORDS = 60  # of a caption at most; what is more stands as a note under the table
+CAPTION_WORDS = 60  # most words of a caption; the rest becomes a note under the table
 TOO_SHORT = "the stroke has too few readings"  # for an interval
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What stands in one cell, the note that explains it, and under it the interval of its number."""
+    """One cell: its text, an explanatory note, and the interval under its number."""
 
     text: str
     note: str = ""
@@ -33,7 +33,7 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Rows under a heading of their own, "" for none."""
+    """Rows under one heading, "" for none."""
 
     name: str
     rows: tuple[tuple[Cell, ...], ...]
@@ -51,7 +51,7 @@ class Table:
 
 
 Format = Callable[[float], str]  # a number as text
-Row = tuple[Cell | str | int, ...]  # a text or a whole number stands for a cell of its own
+Row = tuple[Cell | str | int, ...]  # a text or a whole number becomes a cell
 Rows = tuple[str, Iterable[Row]]  # the heading of a group, and its rows
 
 
@@ -70,9 +70,9 @@ def estimate_cell(
     of_limits: Format | None = None,
     unit: float = 1.0,
 ) -> Cell:
-    """Return a number over its interval, `without` which it has a note that says why; or a dash with its reason.
+    """Return a number over its interval, or with the note `without` on why it has none; or a dash with its reason.
 
-    `of_limits` shows an end of the interval where `as_text` shows more than a number; `unit` as for `wording.between`.
+    `of_limits` formats an end of the interval where `as_text` adds more than a number; `unit` as for `wording.between`.
     """
     if value is None:
         return number_cell(None, as_text, reason)
@@ -83,14 +83,14 @@ def estimate_cell(
 
 
 def range_cell(low: float | None, high: float | None, as_text: Format, reason: str | None = None) -> Cell:
-    """Return an interval as a cell of its own, a dash with the reason where there is none."""
+    """Return an interval as a separate cell, or a dash with the reason."""
     return Cell(NONE, reason or "") if low is None or high is None else Cell(f"{as_text(low)} to {as_text(high)}")
 
 
 def table(name: str, caption_name: str, columns: str, groups: Iterable[Rows], **values: object) -> Table | None:
-    """Return a table without its empty groups, its notes marked in reading order; None where no group has rows.
+    """Return a table without empty groups, notes marked in reading order; None where no group has rows.
 
-    `columns` are its headings with their units, as in "index | SED [kPa]"; `values` fill the places of its caption.
+    `columns` are its headings with their units, as in "index | SED [kPa]"; `values` fill placeholders of its caption.
     """
     marks: dict[str, str] = {}  # by the note
 
@@ -115,7 +115,7 @@ def _letters(n: int) -> str:
 def _shorten(caption_text: str) -> tuple[str, tuple[tuple[str, str], ...]]:
     """Return a caption of at most `CAPTION_WORDS` words, and the sentences beyond as a note without a mark.
 
-    A sentence that names the model stays in the caption, wherever it stands.
+    A sentence that names the model always stays in the caption.
     """
     if len(caption_text.split()) <= CAPTION_WORDS:
         return caption_text, ()
@@ -137,7 +137,7 @@ def sections_of(sections: Mapping[str, Iterable[Table | None]]) -> dict[str, tup
 def split_off_appendix(
     sections: Mapping[str, tuple[Table, ...]], body: Set[str]
 ) -> tuple[dict[str, tuple[Table, ...]], tuple[Table, ...]]:
-    """Return the sections with those tables that are named in `body`, and all others, for the appendix."""
+    """Return the sections with the tables named in `body`, and the other tables, for the appendix."""
     main = {section: tuple(table for table in tables if table.name in body) for section, tables in sections.items()}
     return main, tuple(table for tables in sections.values() for table in tables if table.name not in body)
 
@@ -145,7 +145,7 @@ def split_off_appendix(
 def group_by_experiment(
     report: Report, findings: Sequence[Finding], experiment: Callable[[Finding], str], row: Callable[[Finding], Row]
 ) -> list[Rows]:
-    """Return the rows of all findings under the names of their experiments, as they come where nothing was judged."""
+    """Return the rows of all findings under the names of their experiments, in their own order without experiments."""
     names = [e.name for e in report.experiments] or list(dict.fromkeys(map(experiment, findings)))
     groups: list[Rows] = [(name, [row(f) for f in findings if experiment(f) == name]) for name in names]
     return [*groups, ("", [row(f) for f in findings if experiment(f) not in names])]

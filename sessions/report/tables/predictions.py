@@ -1,4 +1,4 @@
-"""Tables of predictions: responses, forces beside measured ones, both directions."""
+"""Tables of predictions: responses, forces next to measured ones, both directions."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -24,7 +24,7 @@ from sessions.statistics.scores import bounds
 
 
 def prediction_table(report: Report) -> Table | None:
-    """Return what the model was given, and the SED it predicts."""
+    """Return the model's input and the predicted SED."""
     columns = "µ [1] | which µ | τ max [kPa] | depth [mm] | SED [kPa] | estimated error [%] | solved in [s]"
     strokes = {stroke.number: stroke for stroke in report.strokes}
 
@@ -67,11 +67,11 @@ class _Estimate(NamedTuple):
     reason: str | None  # why there is no number
     interval: Ends | None
     without: str | None  # why there is no interval
-    doubt: str  # why no finger may be in that state, else ""
+    doubt: str  # why no finger can be in that state, else ""
 
 
 def _cell(estimate: _Estimate, as_text: Format, least: int, unit: float = 1.0) -> Cell:
-    """Return a number ± its error, over its interval. A doubtful number has neither, since they would support it."""
+    """Return a number ± its error, over its interval. A doubtful number has neither: they would support it."""
     value, error, reason, interval, without, doubt = estimate
     if doubt and value is not None:
         return estimate_cell(value, as_text, None, None, doubt)
@@ -85,7 +85,7 @@ def _cell(estimate: _Estimate, as_text: Format, least: int, unit: float = 1.0) -
 def _sed(
     value: float | None, error: float | None, reason: str | None, interval: SedInterval | None, doubt: str
 ) -> Cell:
-    """Return an SED in kPa; an interval for which draws were solved is marked with a star."""
+    """Return an SED in kPa; an interval from solved draws is marked with a star."""
     cell = _cell(_Estimate(value, error, reason, *_limits(interval), doubt), sed, 3, 1e3)
     star = cell.interval and interval is not None and interval.method == "sampling"
     return replace(cell, interval=f"{cell.interval}*") if star else cell
@@ -96,14 +96,14 @@ def _stroke_sed(p: PredictionFinding) -> Cell:
 
 
 def _limits(interval: SedInterval | None) -> tuple[Ends | None, str | None]:
-    """Return the limits of an interval, and why it has none."""
+    """Return the limits of an interval, and the reason if it has none."""
     if interval is None:
         return None, "none was asked for (--intervals)"
     return bounds(interval.low, interval.high), interval.reason or None
 
 
 def afferent_table(report: Report) -> Table | None:
-    """Return the firing rates of an afferent, where they were asked for."""
+    """Return the firing rates of an afferent, where requested."""
     if all(p.settled_rate is None for p in report.predictions):
         return None
     quantity = shown_response(report.afferent_quantity)
@@ -126,7 +126,7 @@ def afferent_table(report: Report) -> Table | None:
 
 
 def _response_cell(prediction: PredictionFinding, quantity: ShownResponse) -> Cell:
-    """Return a quantity at the ending in the unit shown, ± its error from the mesh."""
+    """Return a quantity at the ending in its shown unit, ± the error from the mesh."""
     numbers = quantity.numbers(prediction)
     if not numbers:
         return number_cell(None, str, prediction.reasons.get("sed"))
@@ -135,7 +135,7 @@ def _response_cell(prediction: PredictionFinding, quantity: ShownResponse) -> Ce
 
 
 def variants_table(report: Report) -> Table | None:
-    """Return each trial's SED in every variant it was predicted in, side by side; strains one under another."""
+    """Return each trial's SED in all variants, in columns, with strains in groups of rows."""
 
     def cell(variant: Alternative) -> Cell:
         return _sed(variant.sed, variant.error_estimate, variant.reason, variant.interval, variant.doubt)
@@ -147,7 +147,7 @@ def variants_table(report: Report) -> Table | None:
 
 
 def variant_forces_table(report: Report) -> Table | None:
-    """Return the normal force of each variant, or the depth that the measured force presses it to."""
+    """Return the normal force of each variant, or the depth under the measured force."""
 
     def cell(alternative: Alternative) -> Cell:
         pressed = alternative.variant.driven == "force"
@@ -165,7 +165,7 @@ def variant_forces_table(report: Report) -> Table | None:
 
 
 def _variants(report: Report) -> list[Variant]:
-    """Return how trials were predicted otherwise, in the same ways at each strain; [] where none was."""
+    """Return the variants of the trials, the same at each strain; [] without any."""
     alternatives = next((p.alternatives for p in report.predictions if p.alternatives), ())
     return [alternative.variant for alternative in alternatives]
 
@@ -182,7 +182,7 @@ def _by_strain(report: Report, cell: Callable[[Alternative], Cell]) -> list[Rows
 
 
 def force_table(report: Report) -> Table | None:
-    """Return the model's forces beside the measured ones."""
+    """Return the model's forces next to the measured ones."""
     columns = (
         "model N [N/mm] | model N × width [N] | measured N [N] | model T × width [N] | "
         "measured T [N] | depth of the model [mm] | depth to match [mm]"
@@ -219,7 +219,7 @@ def force_table(report: Report) -> Table | None:
     return _table(report, "table-forces", "forces", columns, _rows(report, row), width=width)
 
 
-_OF_STATE = ("normal_per_mm", "normal_force", "tangential_force")  # the depth to match is that of another state
+_OF_STATE = ("normal_per_mm", "normal_force", "tangential_force")  # the depth to match belongs to another state
 _ROUGH = "found on a rough mesh; a trial that --variants small solves under the measured force has an interval"
 
 
@@ -247,7 +247,7 @@ def direction_table(report: Report) -> Table | None:
 
 
 def _ratio(prediction: PredictionFinding) -> tuple[float | None, Ends | None]:
-    """Return the SED slid from distal to proximal over that slid back, with the range that their intervals allow."""
+    """Return the SED slid from distal to proximal over that slid back, with the range from their intervals."""
     if prediction.sed is None or prediction.opposite_sed is None or prediction.direction is None:
         return None, None
     states = (prediction.sed, prediction.interval), (prediction.opposite_sed, prediction.opposite_interval)
@@ -261,7 +261,7 @@ def _ratio(prediction: PredictionFinding) -> tuple[float | None, Ends | None]:
 def _table(
     report: Report, name: str, caption: str, columns: str, groups: Iterable[Rows], **values: str
 ) -> Table | None:
-    """Return a table whose rows are named by trial and index, or by the stroke where there are no trials."""
+    """Return a table with rows named by trial and index, or by the stroke without trials."""
     planned = any(p.trial is not None for p in report.predictions)
     columns = f"{'trial | index' if planned else 'stroke'} | {columns}"
     return table(name, caption, columns, groups, how=_INTERVAL_METHOD, model=report.model, **values)
@@ -283,7 +283,7 @@ def _depth(p: PredictionFinding) -> Cell:
 
 
 def model_mu(stroke: StrokeFinding | None, prediction: PredictionFinding | None) -> tuple[str, float | None]:
-    """Return the mu that the model got, and the name of the stroke's number that it is."""
+    """Return the name of the stroke's number that is the model's mu, and its value."""
     if prediction is not None and prediction.mu is not None:
         return ("mu_max" if prediction.mu_rule == "maximum" else "mu_dynamic"), prediction.mu
     return "mu_dynamic", None if stroke is None else stroke.mu_dynamic

@@ -1,4 +1,4 @@
-"""Table and sentences of what else follows the scores beside the model's quantity, of a session as of a study."""
+"""Tables and sentences on rivals of the model's quantity, for a session or a study."""
 
 from collections.abc import Callable, Mapping, Sequence
 from textwrap import fill
@@ -11,16 +11,16 @@ from sessions.statistics.scores import bounds
 from sessions.statistics.within_subjects import holm
 
 _ALPHA = 0.05
-MANY_SURFACES = 10_000  # beyond which nobody asks how many
-MOST_NAMED = 3  # responses of the model that are no longer named one by one
-_TITLE_WIDTH = 44  # characters that a line of a picture's title has room for
+MANY_SURFACES = 10_000  # a greater number is not shown
+MOST_NAMED = 3  # number of responses from which they are counted, not named
+_TITLE_WIDTH = 44  # characters in a line of a picture's title
 
 
 RivalGroups = Sequence[tuple[str, Sequence[Rival]]]  # name of a group, and its rivals
 
 
 def rival_tables(groups: RivalGroups, quantity: str, model: str) -> tuple[Table | None, Table | None]:
-    """Return what was measured beside a quantity of the `model`, named in short, and the model's other quantities."""
+    """Return tables of measured rivals of a quantity of the `model`, and of the model's other quantities."""
     within = "Steiger (1980), within subjects by the jackknife" if _have_weights(groups) else "Steiger (1980)"
     aic = "AIC: crossed mixed models. " if _have_weights(groups) else ""
     texts = {"label": quantity, "model": model, "within": within, "aic": aic}
@@ -31,7 +31,7 @@ def rival_tables(groups: RivalGroups, quantity: str, model: str) -> tuple[Table 
 
 
 def _have_weights(groups: RivalGroups) -> bool:
-    """Say whether mixed models weigh the rivals, as they do within the subjects of a study."""
+    """Say whether the rivals have weights of mixed models, as within the subjects of a study."""
     return any(rival.weight is not None or "weight" in rival.reasons for _, rivals in groups for rival in rivals)
 
 
@@ -49,7 +49,7 @@ def _table(name: str, groups: RivalGroups, texts: Mapping[str, str], includes: C
 
 
 def rival_title(rivals: Sequence[Rival]) -> str:
-    """Return lines with the r of each measured rival for the title of a picture, "" where there is none."""
+    """Return lines with the r of each measured rival for the title of a picture, "" without any."""
     measured = [rival for rival in rivals if rival.name not in RESPONSES]
     correlations = [(rival.name, correlation(rival.r)) for rival in measured if rival.r is not None]
     unbroken = [f"{name} {r}".replace(" ", "\N{NO-BREAK SPACE}") for name, r in correlations]
@@ -57,7 +57,7 @@ def rival_title(rivals: Sequence[Rival]) -> str:
 
 
 def rivals_sentences(name: str, rivals: Sequence[Rival]) -> list[str]:
-    """Return what the scores can and what they cannot tell apart, a sentence each; none without rivals."""
+    """Return sentences on the rivals that scores can and cannot distinguish; none without rivals."""
     if len(rivals) < 2:
         return []
     contrasts = [rival for rival in rivals if rival.contrast is not None]
@@ -68,7 +68,7 @@ def rivals_sentences(name: str, rivals: Sequence[Rival]) -> list[str]:
 
 
 def _alike(name: str, model: str, rivals: Sequence[Rival]) -> list[str]:
-    """Return which rivals order the surfaces as the model does, and how many surfaces it takes to tell them apart."""
+    """Return a sentence on rivals that order surfaces as the model, and the surfaces needed to distinguish them."""
     alike = [rival for rival in rivals if rival.same_order]
     if not alike:
         return []
@@ -89,7 +89,7 @@ def _alike(name: str, model: str, rivals: Sequence[Rival]) -> list[str]:
 
 
 def _verdict(name: str, model: str, rivals: Sequence[Rival]) -> str:
-    """Return which rivals the scores follow more or less closely than the model, and of which nothing can be said."""
+    """Return a sentence on rivals that scores follow more, less, or indistinguishably closely than the model."""
     sides: dict[str, list[str]] = {"more": [], "less": [], "neither": []}
     contrasts = [(rival.name, rival.contrast) for rival in rivals if rival.contrast is not None]
     adjusted = holm([1.0 if contrast.p is None else contrast.p for _, contrast in contrasts])
@@ -133,7 +133,7 @@ def _row(rival: Rival, quantity: str) -> Row:
 
 
 def _rival_names(names: Sequence[str]) -> str:
-    """Return the names of rivals in words; where they include many responses of the model, their number.
+    """Return the names of rivals in words; many responses of the model are counted instead.
 
     >>> _rival_names(["pressure", "T"]), _rival_names([*list(RESPONSES)[1:], "T"])
     ('pressure and T', 'all 9 other responses of the model and T')
@@ -152,7 +152,7 @@ def _join_names(names: Sequence[str]) -> str:
 
 
 def _two_figures(n: int) -> str:
-    """Return a count with two figures, for it rests on correlations that are themselves uncertain.
+    """Return a count with two figures, since it is from uncertain correlations.
 
     >>> _two_figures(2347), _two_figures(8), _two_figures(2_600_000)
     ('about 2300', 'about 8', 'more than 10 000')

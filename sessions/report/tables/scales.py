@@ -24,7 +24,7 @@ def scales_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
 
 
 def latent_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
-    """Return the latent values of each surface by every kind of judgement, where there are others than scores."""
+    """Return the latent values of each surface by each kind of judgement, if there are any besides scores."""
     judgements: list[Judgement] = [name for name in JUDGEMENTS if any(name in d.latent for d in descriptors)]
     if judgements in ([], ["scores"]):
         return None
@@ -66,7 +66,7 @@ def _value(scale: PairedScale, interval: IntervalEstimate | None) -> Cell:
 
 
 def scale_sentences(findings: DescriptorFindings) -> list[str]:
-    """Return what choices and estimates of a descriptor say beside their tables."""
+    """Return sentences on choices and estimates of a descriptor, in addition to the tables."""
     sentences: list[str] = []
     name = capital(findings.descriptor)
     if findings.scales and findings.scales[0].p is not None:
@@ -104,7 +104,7 @@ PsychometricResults = tuple[str, Mapping[str, Psychometric], Means]  # descripto
 
 
 def psychometric_table(judgements: Iterable[PsychometricResults]) -> Table | None:
-    """Return PSE, JND, lapses, order and scatter of each subject, under the name of what was judged."""
+    """Return PSE, JND, lapses, order and scatter of each subject, grouped by descriptor."""
     groups = [
         (name, (*itertools.starmap(_row, functions.items()), *_mean_row(means)))
         for name, functions, means in judgements
@@ -115,7 +115,7 @@ def psychometric_table(judgements: Iterable[PsychometricResults]) -> Table | Non
 
 
 def session_functions(report: Report) -> list[PsychometricResults]:
-    """Return the psychometric functions of a session, which are one subject's."""
+    """Return the psychometric functions of a session, of one subject."""
     return [
         (e.name, {"this session": e.psychometric}, (None, None))
         for e in report.experiments
@@ -130,7 +130,7 @@ def study_functions(study: StudyFindings) -> list[PsychometricResults]:
 
 
 def psychometric_sentences(results: PsychometricResults) -> list[str]:
-    """Return what comparisons with a standard say: of one subject, or of subjects at large."""
+    """Return sentences on comparisons with a standard, for one subject or for means over subjects."""
     name, functions, (pse, jnd) = results
     title = capital(name)
     fits = [fit for fit in functions.values() if fit.pse is not None and fit.jnd is not None]
@@ -176,12 +176,12 @@ def _range(interval: tuple[float, float] | None, unit: Callable[[float], float],
 
 
 def _percent(difference: float) -> float:
-    """Return a difference of logarithms in percent of the smaller."""
+    """Return a difference of logarithms in percent of the smaller value."""
     return 100.0 * math.expm1(difference)
 
 
 def _mean_percent(log_difference: float) -> float:
-    """Return likewise a difference of which the logarithm was averaged."""
+    """Return the same for the mean of logarithms of such differences."""
     return _percent(math.exp(log_difference))
 
 

@@ -1,4 +1,4 @@
-"""The tables of a session: strokes, scores, how predictions go with them, and the ground truth."""
+"""The tables of a session: strokes, scores, their relation to predictions, and the ground truth."""
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
@@ -108,7 +108,7 @@ def course_table(report: Report) -> Table | None:
 def _table(
     report: Report, name: str, caption: str, columns: str, row: Callable[[StrokeFinding], Row], **values: str
 ) -> Table | None:
-    """Return a table of strokes by experiment, each named with its trial and index where there are trials."""
+    """Return a table of strokes by experiment, each with its trial and index if there are trials."""
     planned = any(stroke.trial is not None for stroke in report.strokes)
 
     def name_row(stroke: StrokeFinding) -> Row:
@@ -131,8 +131,8 @@ def _estimate(stroke: StrokeFinding, name: str, as_text: Format, unit: float = 1
 
 
 def ground_truth_table(report: Report) -> Table | None:
-    """Return the simulator's ground truth beside the numbers of the analysis."""
-    # Of several strokes in a trial the model gets the first.
+    """Return the simulator's ground truth next to the results of the analysis."""
+    # The model uses the first of several strokes in a trial.
     strokes_by_trial = {stroke.trial: stroke for stroke in reversed(report.strokes) if stroke.trial is not None}
     predictions = {prediction.trial: prediction for prediction in report.predictions}
     columns = (
@@ -174,7 +174,7 @@ def score_table(report: Report) -> Table | None:
 
 
 def score_cells(mean: MeanScore) -> Row:
-    """Return index, subjects, mean score, its interval and standard deviation; of a session as of a study."""
+    """Return index, subjects, mean score, its interval and standard deviation; for a session or a study."""
     interval = range_cell(mean.low, mean.high, places(1), mean.reason)
     sd = spread_cell(mean.sd, mean.n, places(1), mean.reason)
     return mean.index, mean.n, digits(mean.mean, 1), interval, sd
@@ -186,7 +186,7 @@ def spread_cell(sd: float | None, n: int, as_text: Format, reason: str | None) -
 
 
 def answer_tables(report: Report) -> tuple[Table | None, ...]:
-    """Return every subject's scores, a table an experiment."""
+    """Return every subject's scores, a table for each experiment."""
     tables: list[Table | None] = []
     for experiment in report.experiments:
         answers = experiment.answers.items()
@@ -198,7 +198,7 @@ def answer_tables(report: Report) -> tuple[Table | None, ...]:
 
 
 def relation_table(report: Report) -> Table | None:
-    """Return how the predicted quantity goes with mean scores and with the indices."""
+    """Return the relation of the predicted quantity to mean scores and to indices."""
     quantity = shown_response(report.response)
     groups: list[Rows] = []
     for e in report.experiments:
@@ -254,7 +254,7 @@ def paths_table(path_groups: Iterable[tuple[str, Sequence[PathFinding]]]) -> Tab
 
 
 def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:
-    """Return the distribution of the correlation in a sentence, and how many paths turn the sign of the usual one."""
+    """Return a sentence on the distribution of the correlation, and the number of paths with the opposite sign."""
     values = correlations(findings)
     summary = five_number_summary(values)
     usual = next((r for r, finding in zip(values, findings, strict=True) if finding.usual and r), 0.0)
@@ -291,7 +291,7 @@ def _spread(summary: FiveNumberSummary | None, paths: int) -> Row:
 
 
 def tables(report: Report) -> dict[str, tuple[Table, ...]]:
-    """Return the tables a report has numbers for, by section, in their order."""
+    """Return the tables of a report that have numbers, by section, in order."""
     rival_groups = [(e.name, e.rivals) for e in report.experiments]
     other_answers = [(e.name, e.other_answers) for e in report.experiments]
     sections = {

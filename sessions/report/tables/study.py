@@ -31,7 +31,7 @@ RowsOf = Callable[[DescriptorFindings], Iterable[Row]]
 
 
 def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
-    """Return the tables a study has numbers for, by section."""
+    """Return the tables of a study that have numbers, by section."""
     sections = {
         "relation": (_relation(study),),
         "scores": (

@@ -15,12 +15,12 @@ from sessions.statistics.visit import TrialRow, Visit, exclusion_of
 
 
 def study_model(study: StudyFindings) -> str:
-    """Return in a few words which model a study's SEDs are of."""
+    """Return a short description of the model of a study's SEDs."""
     return model_in_short(study.options.prediction, study.options.area)
 
 
 def models_table(study: StudyFindings) -> Table | None:
-    """Return the mixed models of scores on the model's response and on index, with how far subjects differ."""
+    """Return the mixed models of scores on the model's response and on index, with the spreads between subjects."""
     quantity = BY_NAME[study.response]
     groups = [
         (
@@ -37,13 +37,13 @@ def models_table(study: StudyFindings) -> Table | None:
 
 
 def _models(findings: DescriptorFindings, study: StudyFindings) -> tuple[tuple[str, MixedModel | str], ...]:
-    """Return the mixed models of a descriptor, each with what the score stands on."""
+    """Return the mixed models of a descriptor, each with the name of its predictor."""
     label = BY_NAME[study.response].label
     return (label, findings.on_response), ("index", findings.on_index), ("index and µ", findings.on_friction)
 
 
 def missing_models(study: StudyFindings) -> list[str]:
-    """Return why there is no correlation of means, and no mixed model: a sentence for each reason."""
+    """Return a sentence for each reason why a correlation of means or a mixed model is missing."""
     by_reason = by_key(
         (model, f"{findings.descriptor} on {predictor}")
         for findings in study.descriptors
@@ -61,7 +61,7 @@ def missing_models(study: StudyFindings) -> list[str]:
 
 
 def missing_scores(study: StudyFindings) -> list[str]:
-    """Return why there is no agreement, and no difference of surfaces: a sentence for each reason."""
+    """Return a sentence for each reason why agreement, intervals or differences of surfaces are missing."""
     sentences: list[str] = []
     for findings in study.descriptors:
         complete_count = sum(None not in answers for answers in findings.answers.values())
@@ -103,7 +103,7 @@ def _terms(model: MixedModel, quantity: Quantity) -> Iterable[Row]:
 
 
 def ground_truth_table(study: StudyFindings) -> Table | None:
-    """Return the true effects of a simulated study beside their estimates."""
+    """Return the true effects of a simulated study next to their estimates."""
     rows = tuple(
         (
             effect.descriptor,
@@ -121,17 +121,17 @@ def ground_truth_table(study: StudyFindings) -> Table | None:
 
 
 def flaws_table(study: StudyFindings) -> Table | None:
-    """Return what went wrong in a simulated study, and whether the analysis detected it."""
+    """Return the faults of a simulated study, and whether the analysis detected them."""
     rows = tuple((flaw.session, flaw.expected, "yes" if flaw.detected else "no") for flaw in study.flaws)
     return table("table-planted-flaws", "study-flaws", "session | simulated | detected", [("", rows)])
 
 
 _TOO_FEW = "too few readings"
-_MOST_TRIALS = 400  # of which the page shows a table; `trials.csv` holds those of any study
+_MOST_TRIALS = 400  # most trials in a table of the page; `trials.csv` has all
 
 
 def trials_table(study: StudyFindings) -> Table | None:
-    """Return every trial with what was scored, measured and predicted; None where they are too many for a page."""
+    """Return every trial with scores, measurements and predictions; None where they are too many for a page."""
     if sum(len(visit.rows) for visit in study.visits) > _MOST_TRIALS:
         return None
     columns = (
