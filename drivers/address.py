@@ -1,4 +1,4 @@
-"""Device addresses as people type them, scheme://host?option=value&option=value, and what a driver does with one."""
+"""Device addresses, scheme://host?option=value&option=value, and the driver that reads one."""
 
 import math
 from collections.abc import Callable, Generator, Mapping
@@ -16,12 +16,12 @@ Word = TypeVar("Word", bound=str)
 
 
 class AddressError(SetupError):
-    """An address that cannot be any device's, or an option that this kind of device does not have."""
+    """An invalid address, or an option that this kind of device does not have."""
 
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """One device address, cut into its parts."""
+    """The parts of one device address."""
 
     uri: str  # as typed
     scheme: str  # the driver's name, e.g. "net-ft"
@@ -39,7 +39,7 @@ class Address:
         return int(text)
 
     def positive(self, option: str) -> float:
-        """Return an option that is a number above 0, nan where it is not given. Raises AddressError for another."""
+        """Return an option that is a number above 0, nan where it is not given. Raises AddressError."""
         text = self.options.get(option)
         if text is None:
             return math.nan
@@ -85,7 +85,7 @@ def parse_address(uri: str) -> Address:
 
 @contextmanager
 def prefix_failures(address: Address) -> Generator[None]:
-    """Put the address before what a link or a device says of its failure inside."""
+    """Prefix failures of a link or a device inside with the address."""
     try:
         yield
     except (LinkLost, DeviceFault) as error:
@@ -95,7 +95,7 @@ def prefix_failures(address: Address) -> Generator[None]:
 def check_form(address: Address, example: str, option_names: frozenset[str]) -> None:
     """Raise AddressError unless the address has the parts of an example, and no option that is not in `option_names`.
 
-    Where the example has a path, host and path are one name, and whoever opens what it names checks it.
+    Where the example has a path, host and path form one name, which is checked on opening.
     """
     form = parse_address(example)
     for part in () if form.path else ("host", "path"):
@@ -108,7 +108,7 @@ def check_form(address: Address, example: str, option_names: frozenset[str]) -> 
             raise AddressError(f"{address.uri} names no {part}; write for example {example}")
     for option in address.options:
         if option not in option_names:
-            names = ", ".join(sorted(option_names | {"tool"}))  # which every transducer takes, see `without_tool`
+            names = ", ".join(sorted(option_names | {"tool"}))  # accepted for every transducer, see `without_tool`
             raise AddressError(f"{address.uri}: unknown option {option!r}; allowed are {names}")
 
 
@@ -118,23 +118,23 @@ class Driver:
 
     name: str  # the scheme of its addresses
     open: Callable[[Address, Clock, Deadline], Transducer]
-    identify: Callable[[Address, Deadline], TransducerInfo]  # who answers; changes nothing
-    usual: tuple[str, ...] = ()  # addresses where such a device stands unless somebody moved it
+    identify: Callable[[Address, Deadline], TransducerInfo]  # identity of the device; changes nothing
+    usual: tuple[str, ...] = ()  # default addresses of such a device
     serial_line: bool = False  # it reads a serial line, and its addresses name the port
 
 
-_FARTHEST = 1000.0  # displacement that is believed [mm]
-_MOST = 360.0  # turn that is believed [degrees]
+_FARTHEST = 1000.0  # largest accepted displacement [mm]
+_MOST = 360.0  # largest accepted angle [degrees]
 
 Tool = tuple[float, ...]  # (6,), or empty for none
 
 
 def without_tool(address: Address) -> tuple[Address, Tool]:
-    """Return the address without its tool option, and the tool transform. Raises AddressError where that is none.
+    """Return the address without its tool option, and the tool transform. Raises AddressError where that is invalid.
 
-    `tool=dx,dy,dz,rx,ry,rz` says where the new origin lies in the transducer's own frame [mm], then the turns about x,
-    y and z [degrees], in the maker's order (`drivers.calibration.wrench_transform`). It comes after whatever transform
-    the calibration, or the box, holds itself.
+    `tool=dx,dy,dz,rx,ry,rz` is the position of the new origin in the transducer's own frame [mm], then the rotations
+    about x, y and z [degrees], in the maker's order (`drivers.calibration.wrench_transform`). It is applied after any
+    transform of the calibration or the box.
     """
     text = address.options.get("tool")
     if text is None:
@@ -151,7 +151,7 @@ def without_tool(address: Address) -> tuple[Address, Tool]:
 
 
 def with_tool(info: TransducerInfo, tool: Tool) -> TransducerInfo:
-    """Return who the transducer is, its wrench as the tool transform says."""
+    """Return the transducer's info with the tool transform applied to its calibration."""
     if not tool:
         return info
     description = "{:g} {:g} {:g} mm, {:g} {:g} {:g} degrees, as the address says".format(*tool)

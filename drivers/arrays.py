@@ -1,4 +1,4 @@
-"""The arrays that readings and all that is made of them are."""
+"""Types of arrays."""
 
 import numpy as np
 from numpy.typing import NDArray

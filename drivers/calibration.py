@@ -1,4 +1,4 @@
-"""From raw readings to the wrench the finger exerts on the stimulus, and how much of its range a transducer carries."""
+"""From raw readings to the finger's wrench on the stimulus, and the load of a transducer relative to its range."""
 
 from dataclasses import dataclass, replace
 
@@ -9,13 +9,13 @@ from drivers.arrays import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """What turns six raw numbers of one transducer into newtons and newton millimetres."""
+    """Conversion of one transducer's six raw values into newtons and newton millimetres."""
 
-    serial: str  # the transducer's serial number, as the device or its file states it
+    serial: str  # the transducer's serial number, from the device or its file
     raw_unit: str  # "counts", "V", or "N, N mm" for readings that came as a wrench
     matrix: Array  # (6, 6): wrench [N, N mm] = matrix @ (raw - bias), the tool transform included
-    rated: Array  # (6,) rated range of each axis of the transducer's own frame [N, N mm]; nan where nobody stated it
-    source: str  # where the numbers came from, for people
+    rated: Array  # (6,) rated range of each axis of the transducer's own frame [N, N mm]; nan where unknown
+    source: str  # source of the numbers, for people
     tool: tuple[float, ...] = ()  # (6,) the user's tool transform: dx dy dz [mm], rx ry rz [degrees]; empty: none
 
     def wrench(self, raw: Array, bias: Array) -> Array:
@@ -28,16 +28,16 @@ class Calibration:
         return (raw - bias) @ self.matrix.T
 
     def in_own_frame(self, wrench: Array) -> Array:
-        """Return a wrench (n, 6) [N, N mm] about the transducer's own origin and axes, for which `rated` holds."""
+        """Return a wrench (n, 6) [N, N mm] about the transducer's own origin and axes, to which `rated` applies."""
         if not self.tool:
             return wrench
         back = np.linalg.inv(_tool_matrix(self.tool)).astype(np.float64)
         return wrench @ back.T
 
     def with_tool(self, tool: tuple[float, ...]) -> "Calibration":
-        """Return the calibration with a tool transform (6,) [mm, degrees] behind the transducer's own.
+        """Return the calibration with a tool transform (6,) [mm, degrees] after the transducer's own.
 
-        A force couple moved 5 mm towards the transducer: 1 N along y then adds -5 N mm about x.
+        An origin moved 5 mm towards the transducer: 1 N along y then adds -5 N mm about x.
 
         >>> cal = Calibration("FT1", "N, N mm", np.eye(6), np.full(6, np.nan), "by hand")
         >>> cal.with_tool((0.0, 0.0, -5.0, 0.0, 0.0, 0.0)).matrix[3].tolist()
@@ -76,15 +76,15 @@ def _tool_matrix(tool: tuple[float, ...]) -> Array:
 
 
 WARNING = 0.8  # of a range [-]
-# Of the range of each axis, and of two taken together: there the Ethernet Axia's manual calls a reading out of range.
+# Loads of single axes, and the combined load, at which the Ethernet Axia's manual calls a reading out of range.
 LIMITS = (1.0,) * 6 + (1.05,)
 
 
 def loads(wrench: Array, rated: Array) -> Array:
-    """Return the amounts of Fx to Tz over their ranges and the combined load (n, 7) [-], of a wrench (n, 6) [N, N mm].
+    """Return |Fx| to |Tz| over their ranges and the combined load (n, 7) [-] of a wrench (n, 6) [N, N mm].
 
-    Forces across strain the same beams as the torque about z, and the force along z those that the torques across do:
-    the combined load is the greater of Fxy + Tz and Fz + Txy, amounts over their ranges (maker's manual of the Ethernet
+    Lateral forces strain the same beams as the torque about z, and the force along z the same as lateral torques: the
+    combined load is the greater of Fxy + Tz and Fz + Txy, magnitudes over their ranges (maker's manual of the Ethernet
     Axia, status bit 30). nan where a range `rated` (6,) is unknown.
 
     >>> loads(np.array([[18.0, 0.0, -9.0, 0.0, 0.0, 250.0]]), np.array([36.0, 36.0, 36.0, 500.0, 500.0, 500.0]))

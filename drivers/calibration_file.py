@@ -1,8 +1,8 @@
 """The maker's calibration file: from six gauge voltages to a wrench.
 
 The file (`.cal`, XML) belongs to one transducer with analogue outputs. Its working matrix is
-T(BasicTransform) x (Axis values / scale), as the maker's DAQ F/T C library computes it (ftconfig.c, version 1.0.2);
-newer files (1.1) also print the product as UserAxis, to five decimals, which serves as a check here.
+T(BasicTransform) x (Axis values / scale), as in the maker's DAQ F/T C library (ftconfig.c, version 1.0.2); newer files
+(1.1) also print the product as UserAxis, to five decimals, which is checked here.
 """
 
 import hashlib
@@ -30,31 +30,31 @@ _ANGLE = {"degrees": math.pi / 180.0, "deg": math.pi / 180.0, "radians": 1.0, "r
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CalibrationFile:
-    """What a calibration file says."""
+    """Content of a calibration file."""
 
     calibration: Calibration  # raw unit V; rated range from the file's `max`
     sha256: str  # of the file's bytes, in hexadecimal
     body: str  # of the transducer, e.g. "Nano43"
     part_number: str  # e.g. "SI-36-0.5"
-    calibrated: str  # the day of calibration, as YYYY-MM-DD where the file's date can be understood
+    calibrated: str  # the day of calibration, as YYYY-MM-DD where the file's date is understood
     checked: bool  # the file prints its working matrix too, and both agree
 
 
 def read_calibration_file(path: Path) -> CalibrationFile:
-    """Return what the file at `path` says, ~ being the user's home. Raises SetupError where it makes no sense."""
+    """Read the calibration file at `path` (~: the user's home). Raises SetupError where it is invalid."""
     try:
         with path.expanduser().open("rb") as file:
             data = file.read(LONGEST + 1)
-    except (OSError, ValueError, RuntimeError) as error:  # the last: there is no such home
+    except (OSError, ValueError, RuntimeError) as error:  # the last: an unknown home
         reason = (getattr(error, "strerror", None) or "not a file name").lower()
         raise SetupError(f"{path}: cannot be read ({reason}); check the name of the calibration file") from None
     return parse_calibration_file(data, path.name)
 
 
 def parse_calibration_file(data: bytes, name: str) -> CalibrationFile:
-    """Return what the bytes of a calibration file called `name` say. Raises SetupError with one sentence otherwise."""
+    """Parse the bytes of a calibration file called `name`. Raises SetupError, a sentence, where they are invalid."""
     try:
-        with np.errstate(all="ignore"):  # numbers too great for a matrix are found out below
+        with np.errstate(all="ignore"):  # overflows are detected below
             return _parse(data, name)
     except _Unusable as why:
         raise SetupError(f"{name}: {why}; take the file as the maker delivered it for this serial number") from None
@@ -95,7 +95,7 @@ def _parse(data: bytes, name: str) -> CalibrationFile:
 
 
 def _sensor_and_body(data: bytes) -> tuple[Element, Element]:
-    """Return the two elements that say what is calibrated; one whose computation is not done here is refused."""
+    """Return the sensor and calibration elements. Raises _Unusable for a file that needs computations not done here."""
     if len(data) > LONGEST:
         raise _Unusable(f"it is longer than {LONGEST} bytes, which no calibration file is")
     try:
@@ -155,7 +155,7 @@ def _transform(body: Element) -> Array:
 
 
 def _check(matrix: Array, working: Array, rounding: Array) -> None:
-    """Raise where the file's own working matrix is another than the one computed, beyond its rounding."""
+    """Raise where the file's own working matrix differs from the computed one by more than its rounding."""
     apart = np.abs(matrix - working) > 1.01 * rounding
     if np.any(apart):
         axis, gauge = (int(i) for i in np.argwhere(apart)[0])
@@ -189,7 +189,7 @@ def _word(element: Element, key: str) -> str:
 
 
 def _day(text: str) -> str:
-    """Return a US date (month/day/year) as YYYY-MM-DD, or the text itself where it is none.
+    """Return a US date (month/day/year) as YYYY-MM-DD, or the text itself if it is not one.
 
     >>> _day("3/5/2014"), _day("spring 2014")
     ('2014-03-05', 'spring 2014')

@@ -1,4 +1,4 @@
-"""The list of drivers: which name opens what. It reads itself from the folders."""
+"""The list of drivers, read from the folders, and opening of transducers by address."""
 
 import pkgutil
 from collections.abc import Iterable
@@ -14,7 +14,7 @@ from drivers.transducer import DeviceFault, LinkLost, SetupError, Transducer, Tr
 
 @dataclass(frozen=True, slots=True)
 class Probe:
-    """What answered at one address: either who, or why nobody did."""
+    """The result of probing one address: the transducer, or why none answered."""
 
     uri: str
     info: TransducerInfo | None
@@ -28,9 +28,9 @@ DRIVERS: tuple[Driver, ...] = tuple(
 
 
 def open_transducer(uri: str, clock: Clock) -> Transducer:
-    """Return the transducer at `uri`, identified and set as the address asks, not yet streaming.
+    """Return the transducer at `uri`, identified and set up by its address, not yet streaming.
 
-    Raises SetupError when the address or a setting cannot be met, LinkLost when nothing answers.
+    Raises SetupError when the address or a setting is not possible, LinkLost when nothing answers.
     """
     address, tool = without_tool(parse_address(uri))
     transducer = _driver(address).open(address, clock, Deadline.for_opening())

@@ -1,19 +1,19 @@
-"""The clock everything in a session is timed by: real, paced, or simulated."""
+"""The clock of a session: real, paced, or simulated."""
 
 import math
 import threading
 import time
 from typing import Protocol
 
-LONGEST_STEP = 0.1  # of a clock that all of a simulated bench share, shorter than people take to react [s]
+LONGEST_STEP = 0.1  # of a clock shared by all parts of a simulated bench, shorter than people's reaction times [s]
 
 
 class Clock(Protocol):
-    """A monotonic clock that can be waited on."""
+    """A monotonic clock with a wait."""
 
     @property
     def factor(self) -> float:
-        """Seconds of this clock in one real second [-]; 1 for a real clock, 0 where the two are not related."""
+        """Seconds of this clock in one real second [-]; 1 for a real clock, 0 where they are unrelated."""
 
     def now_ns(self) -> int:
         """Return the time [ns], never running backwards."""
@@ -40,8 +40,8 @@ class PacedClock:
     def __init__(self, factor: float, longest_step: float = math.inf) -> None:
         """Start at the machine's monotonic time, then run `factor` (> 0) times as fast.
 
-        Between two looks at it the clock moves by `longest_step` [s of this clock] at most. A machine that halts all
-        who share the clock for an instant then halts their time too. Those on two clocks must let them run freely.
+        Between two readings of it the clock advances by at most `longest_step` [s of this clock]. A machine that halts
+        all users of the clock for an instant then halts their time too. Users of two clocks must not limit them.
         """
         self.factor = factor
         self._longest_ns = longest_step * 1e9
@@ -62,20 +62,20 @@ class PacedClock:
 
 
 def clock_at(factor: float, longest_step: float = math.inf) -> Clock:
-    """Return the machine's clock, or one that runs `factor` times as fast as it: see `PacedClock`."""
+    """Return the machine's clock, or one that runs `factor` times as fast: see `PacedClock`."""
     return RealClock() if factor == 1.0 else PacedClock(factor, longest_step)
 
 
 class SimulatedClock:
-    """A clock that moves when it is waited on, for simulated benches only: a session takes no longer than its work.
+    """A clock that only moves during waits, for simulated benches only: a session takes no longer than its work.
 
-    Every look takes a microsecond, so that no two events share an instant.
+    Every reading of it takes a microsecond, so that no two events share an instant.
     """
 
     factor = 0.0
 
     def __init__(self, at_ns: int = 1_000_000_000) -> None:
-        self.at_ns = at_ns  # the time, which reading this does not move [ns]
+        self.at_ns = at_ns  # the time; reading this attribute does not move it [ns]
 
     def now_ns(self) -> int:
         self.at_ns += 1000
@@ -86,15 +86,15 @@ class SimulatedClock:
 
 
 class StillClock:
-    """A clock that stands, for what is read back and happens no more."""
+    """A clock that does not advance, for recorded data."""
 
     factor = 1.0
 
     def __init__(self, at_ns: int) -> None:
-        self.at_ns = at_ns  # where it stands [ns]
+        self.at_ns = at_ns  # the time [ns]
 
     def now_ns(self) -> int:
         return self.at_ns
 
     def sleep(self, seconds: float) -> None:
-        """Pass no time: there is nothing to wait for."""
+        """Return without waiting."""

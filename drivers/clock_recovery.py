@@ -1,4 +1,4 @@
-"""Numbers, times and the rate of records that carry none of them: from their order and when they arrived."""
+"""Numbers, times and the rate of records without any of them, from their order and arrival."""
 
 import math
 from collections import deque
@@ -10,20 +10,20 @@ import numpy as np
 
 from drivers.arrays import Array, Indices
 
-WINDOW = 1.0  # the record that waited least in each window is used [real s]
-_COARSE, _FINE = (1, 0.1), (3, 0.02)  # windows, and the error of the rate over them, twice in a row, that counts [-]
+WINDOW = 1.0  # the least delayed record of each window is used [real s]
+_COARSE, _FINE = (1, 0.1), (3, 0.02)  # windows, and the error of the rate over them that counts, twice in a row [-]
 
 
 class RateWatch:
-    """Watches one stream. Records reach the computer late, and never early: so of each window one is looked at."""
+    """Watches one stream. Records may arrive late, never early, so the least late one of each window counts."""
 
     def __init__(self, rate: float, factor: float, silence: float, vague: float = 0.0) -> None:
         """Expect `rate` counts a second [Hz] of a session clock that runs `factor` times real time.
 
-        Across more than `silence` [s] without a record nothing is compared: something may have been lost in it.
-        `rate` was only measured for a moment where it is `vague`, by up to that share [-]: what is found first is it.
+        Rates are not compared across more than `silence` [s] without a record, in which records may be lost. A `vague`
+        rate is a rough measurement, off by up to that share [-]: the first precise rate replaces it.
         """
-        self.rate = rate  # as found last [Hz]
+        self.rate = rate  # latest one [Hz]
         self.changes = 0  # of the rate, so far
         self.nominal = rate  # as set [Hz]
         self._vague = vague
@@ -52,11 +52,11 @@ class RateWatch:
         return self._rate_changed()
 
     def begin_anew(self) -> None:
-        """Forget what has come: what comes next does not go on from it."""
+        """Forget earlier records: later ones do not continue them."""
         self._best = None
 
     def _rate_changed(self) -> bool:
-        """Say whether two successive stretches agree on another rate, and take that one."""
+        """Say whether two successive stretches agree on another rate, and adopt it."""
         for windows, most in (_COARSE, _FINE):
             if len(self._points) <= 2 * windows:
                 continue
@@ -67,7 +67,7 @@ class RateWatch:
                 self._find(_rate(first, last), most)
                 return True
             if windows == _FINE[0]:
-                self._vague = 0.0  # it is as it was measured
+                self._vague = 0.0  # the measured rate is confirmed
         return False
 
     def _find(self, rate: float, most: float) -> None:
@@ -80,11 +80,11 @@ class RateWatch:
 
 
 def rate_of_least_late(arrivals: Sequence[tuple[int, int]]) -> float:
-    """Return the steady rate [Hz] at which these counts can have come [ns], each late but never early; nan of one.
+    """Return the steady rate [Hz] of counts with arrivals [ns] that may be late but never early; nan for a single one.
 
-    That of the line below all arrivals that is highest in their middle (Moon, Skelly and Towsley 1999, Proc. INFOCOM,
-    227): as long as two of them came in time, one on either side, it is exact. At 100 Hz, the first 7 ms late and
-    the last 30:
+    It is the slope of the line below all arrivals that is highest at their middle (Moon, Skelly and Towsley 1999, Proc.
+    INFOCOM, 227): exact if two arrivals were in time, one on either side. At 100 Hz, the first 7 ms late and the last
+    30:
 
     >>> rate_of_least_late([(0, 7_000_000), (1, 10_000_000), (2, 20_000_000), (3, 30_000_000), (4, 70_000_000)])
     100.0
@@ -102,12 +102,12 @@ def rate_of_least_late(arrivals: Sequence[tuple[int, int]]) -> float:
 
 
 def _turns_down(first: tuple[int, int], middle: tuple[int, int], last: tuple[int, int]) -> bool:
-    """Tell whether the middle point lies on or above the line between the others."""
+    """Say whether the middle point is on or above the line between the others."""
     return (middle[1] - first[1]) * (last[0] - first[0]) >= (last[1] - first[1]) * (middle[0] - first[0])
 
 
 def rate_words(subject: str, rate: float, nominal: float) -> str:
-    """Return what is the matter with a rate, or that it no longer is.
+    """Return a clause on a wrong rate, or on its return to normal.
 
     >>> rate_words("readings come", 147.5, 295.0), rate_words("readings come", 295.0, 295.0)
     ('readings come at 147.5 Hz, not at 295 Hz', 'readings come at 295 Hz again')
@@ -121,29 +121,29 @@ def _rate(first: tuple[int, float], last: tuple[int, float]) -> float:
 
 
 GAP = 0.1  # shortest loss without a trace that is noticed [real s]
-_SETTLE = 0.05  # how long after a pause its lump may still be arriving [real s]
-_STEADY = 0.3  # records come as fast as they are made where their lateness changes by less of the time passed [-]
-_LONGEST = 1.0  # that records are kept back while they come faster or slower [real s]
-_LEAD = 1.0  # how fast times and rate follow the session's clock [rad/s]
-SPREAD = 0.05  # how far the true rate may lie from the stated or measured one [-]
+_SETTLE = 0.05  # time after a pause in which delayed records may still arrive [real s]
+_STEADY = 0.3  # records arrive at their own rate where their lateness changes by less than this share of the time [-]
+_LONGEST = 1.0  # longest time that records are held back while their rate varies [real s]
+_LEAD = 1.0  # bandwidth with which times and rate follow the session's clock [rad/s]
+SPREAD = 0.05  # largest relative difference of the true rate from the stated or measured one [-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placement:
-    """Where n records lie."""
+    """Numbers and times of n records."""
 
     sequence: Indices  # (n,) from 1; a missing number is a lost or broken record
     time: Array  # (n,) [s] from 0, strictly rising
 
 
 class ClockRecovery:
-    """Numbers and times for records that carry neither. After a pause they are kept back until losses are clear.
+    """Numbers and times for records without either. After a pause records are held back until losses are clear.
 
-    Records follow each other at a steady rate that is known within a few per cent. Their times advance at that rate,
-    and are led by the session's clock: slowly, so that bytes handed over in lumps do not shake them. A loss that left
-    broken bytes behind is counted from those. A loss that left nothing behind shows as a pause that no lump of records
-    makes up for; one shorter than GAP stays unnoticed in the numbers, while the times recover within seconds.
-    A changed rate is followed (`RateWatch`); what was taken for lost until then stays named as lost.
+    Records follow each other at a steady rate, known within a few per cent. Their times advance at that rate and slowly
+    follow the session's clock, so that bytes delivered in lumps do not shake them. A loss with broken bytes is counted
+    from those. A loss without a trace shows as a pause that no lump of records makes up for; below GAP it stays
+    unnoticed in the numbers, while times recover within seconds. A changed rate is followed (`RateWatch`); losses
+    counted before that remain.
     """
 
     def __init__(self, rate: float, factor: float = 1.0) -> None:
@@ -157,21 +157,21 @@ class ClockRecovery:
         self._count = 0  # records that came, broken ones too
         self._sequence = 0
         self._time = 0.0
-        self._zero_ns: int | None = None  # when the session clock stood at time 0
+        self._zero_ns: int | None = None  # session clock at time 0
         self._held_damaged: list[Indices] = []
         self._held_since_ns = 0
         self._held_until_ns = 0
-        self._looked_ns, self._held_late = 0, 0.0  # how late they were when that was last looked at [s]
+        self._looked_ns, self._held_late = 0, 0.0  # their lateness at the last check [s]
 
     def take(self, damaged: Indices, received_ns: int) -> Placement:
-        """Place n records that arrived together, broken ones counted before each (n,), and any kept back before."""
+        """Place n records that arrived together, with broken ones before each (n,), and earlier held-back records."""
         if len(damaged) == 0:
             return _NONE
         self._count += len(damaged) + int(damaged.sum())
         if self.watch.take(self._count, received_ns):
             self._period = 1.0 / self.watch.rate
         if self._zero_ns is None:
-            damaged = np.concatenate([[0], damaged[1:]])  # what was before the first record is not of this stream
+            damaged = np.concatenate([[0], damaged[1:]])  # bytes before the first record are not of this stream
             self._time = -self._period
             self._zero_ns = received_ns - round((damaged.sum() + len(damaged) - 1) * self._period * 1e9)
         if not self._held_damaged:
@@ -192,7 +192,7 @@ class ClockRecovery:
         return _NONE
 
     def release(self) -> Placement:
-        """Place what was kept back, as at the end of the stream."""
+        """Place records held back, as at the end of the stream."""
         if not self._held_damaged:
             return _NONE
         damaged = np.concatenate(self._held_damaged)
@@ -206,7 +206,7 @@ class ClockRecovery:
         return self._place(damaged, self._held_until_ns)
 
     def bridge(self, received_ns: int) -> None:
-        """Let the stream, restarted, go on at `received_ns` behind a gap of at least one record."""
+        """Continue the restarted stream at `received_ns`, after a gap of at least one record."""
         if self._zero_ns is None:
             return
         self.watch.begin_anew()
@@ -217,13 +217,13 @@ class ClockRecovery:
         self.lost += gap
 
     def _lateness(self, damaged: Indices, received_ns: int) -> float:
-        """Return how much later than at a steady rate the last of these records came [s]."""
+        """Return the delay of the last of these records relative to a steady rate [s]."""
         assert self._zero_ns is not None
         steady = self._time + (int(damaged.sum()) + len(damaged)) * self._period
         return (received_ns - self._zero_ns) * 1e-9 - steady
 
     def _place(self, damaged: Indices, received_ns: int) -> Placement:
-        """Place records whose numbers follow on, and let the clock lead."""
+        """Place records that continue the numbers, and let times follow the session clock."""
         slots = np.cumsum(damaged + 1)
         count = int(slots[-1])
         late = max(-self._limit, min(self._limit, self._lateness(damaged, received_ns)))
@@ -248,18 +248,17 @@ _NONE = Placement(np.empty(0, np.int64), np.empty(0))
 class ScanCount:
     """Numbers and times of scans by the converter's own clock: scan k is at k / rate.
 
-    The host's clock only shows how long the converter was away, and whether a counter of losses went round
-    unseen.
+    The host's clock only shows how long the converter was away, and whether a counter of losses wrapped unnoticed.
     """
 
     def __init__(self, rate: float, factor: float = 1.0, *, wrap: int = 0) -> None:
-        """Expect `rate` scans a second [Hz] of a clock `factor` times real time; losses are known modulo `wrap`."""
+        """Expect `rate` scans a second [Hz] of a clock `factor` times real time; loss counts are modulo `wrap`."""
         self.lost = 0
         self.watch = RateWatch(rate, factor, GAP * factor + 10.0 / rate)
         self._rate = rate
         self._wrap = wrap
         self._sequence = 0
-        self._behind: float | None = None  # arrival minus time of the last scan before [s]
+        self._behind: float | None = None  # arrival minus time of the previous scan [s]
 
     def take(self, damaged: Indices, received_ns: int) -> Placement:
         """Place n scans that arrived together, with those lost before each (n,)."""
@@ -278,11 +277,11 @@ class ScanCount:
         return Placement(sequence, (sequence - 1) / self._rate)
 
     def release(self) -> Placement:
-        """Place what was kept back: nothing ever is."""
+        """Return nothing: no scan is held back."""
         return _NONE
 
     def bridge(self, received_ns: int) -> None:
-        """Let the stream, restarted, go on at `received_ns` behind a gap of at least one scan."""
+        """Continue the restarted stream at `received_ns`, after a gap of at least one scan."""
         self.watch.begin_anew()
         if self._behind is not None:
             away = self._arrival_minus_time(self._sequence, received_ns) - self._behind

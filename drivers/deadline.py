@@ -1,4 +1,4 @@
-"""A link to a device, and the one limit on connecting: every wait ends by a deadline or at a stop."""
+"""A link to a device, and the limit on waiting: every wait ends by a deadline or at a stop."""
 
 import threading
 import time
@@ -13,28 +13,28 @@ class Link(Protocol):
     """A way to one device."""
 
     def send(self, data: bytes) -> None:
-        """Send `data`. Raises LinkLost when the link is gone for good."""
+        """Send `data`. Raises LinkLost when the link is lost for good."""
 
     def receive(self, timeout: float) -> bytes | None:
-        """Return what arrived next, or None when nothing came within `timeout` real seconds."""
+        """Return the next bytes, or None when nothing arrived within `timeout` real seconds."""
 
     def close(self) -> None:
-        """Give the port back. Harmless when repeated."""
+        """Release the port. Harmless when repeated."""
 
 
 # All in real seconds.
-CONNECTING = 4.5  # from asking for a device to its first reading, so that with closing all ends within 5 s
-FIRST_READING = 1.5  # of these are kept for beginning the stream: a device of 1 Hz needs one
-ENDING = 0.2  # for bringing a stream to an end
-TICK = 0.03  # longest single wait, and so for a stop
+CONNECTING = 4.5  # from opening a device to its first reading, so that opening and closing end within 5 s
+FIRST_READING = 1.5  # reserved of these for starting the stream: a device of 1 Hz needs one
+ENDING = 0.2  # for ending a stream
+TICK = 0.03  # longest single wait, and so the longest delay of a stop
 
 
 class Stopped(Exception):
-    """Somebody wants the wait to end."""
+    """A stop was requested during a wait."""
 
 
 class Deadline:
-    """A limit on all that is waited for, which nothing that arrives can put off."""
+    """A limit on a whole wait, which arriving data do not extend."""
 
     def __init__(self, seconds: float, stopping: threading.Event | None = None) -> None:
         """End in `seconds` real seconds, or as soon as `stopping` is set."""
@@ -49,7 +49,7 @@ class Deadline:
 
     @property
     def spent(self) -> float:
-        """Real seconds since it was set."""
+        """Real seconds since the limit was set."""
         return time.monotonic() - self._began
 
     @property
@@ -60,11 +60,11 @@ class Deadline:
         return max(self._seconds - self.spent, 0.0)
 
     def within(self, seconds: float) -> "Deadline":
-        """Return a limit on a part of the wait: in `seconds`, and not later than this one."""
+        """Return a limit on a part of the wait: `seconds`, but not later than this one."""
         return Deadline(min(seconds, self.remaining), self._stopping)
 
     def check(self) -> None:
-        """Raise LinkLost when the time is over, Stopped when it shall end."""
+        """Raise LinkLost when the time is over, Stopped at a stop."""
         if self.remaining <= 0.0:
             raise LinkLost(f"it was not ready within {self._seconds:.2g} s; check its power, the cable and the address")
 

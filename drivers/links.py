@@ -12,16 +12,16 @@ from typing import Any
 from drivers.deadline import TICK, Deadline
 from drivers.transducer import LinkLost, SetupError
 
-RECEIVE_BUFFER = 4 * 2**20  # asked of the system for UDP [bytes]; it may grant less
+RECEIVE_BUFFER = 4 * 2**20  # requested for UDP [bytes]; the system may grant less
 MOST_BODY = 64 * 1024  # a page longer than this is refused [bytes]
 MOST_HEAD = 8 * 1024
 
 
 class UdpLink:
-    """Datagrams to and from one address and port; those of others are not seen."""
+    """Datagrams to and from one address and port only."""
 
     def __init__(self, address: str, port: int) -> None:
-        """Bind a free local port. Raises LinkLost when no way leads to the IP address."""
+        """Bind a free local port. Raises LinkLost without a route to the IP address."""
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
@@ -36,7 +36,7 @@ class UdpLink:
         self._socket.settimeout(0.0)
 
     def send(self, data: bytes) -> None:
-        """Send one datagram. An earlier one that was refused is no reason to give up: the device may be starting."""
+        """Send one datagram. A refusal of an earlier one is ignored: the device may be starting."""
         try:
             self._socket.send(data)
         except ConnectionError:
@@ -51,7 +51,7 @@ class UdpLink:
             self._timeout = timeout
         try:
             return self._socket.recv(65536)
-        except (TimeoutError, BlockingIOError, ConnectionError):  # the last: an earlier datagram of ours was refused
+        except (TimeoutError, BlockingIOError, ConnectionError):  # the last: an earlier datagram was refused
             return None
         except OSError as error:
             raise LinkLost(f"cannot receive from {self._location}: {_reason(error)}; check the network cable") from None
@@ -61,9 +61,9 @@ class UdpLink:
 
 
 def tcp_answer(address: str, port: int, request: bytes, size: int, deadline: Deadline) -> bytes:
-    """Return the `size` bytes that answer a request, or as many as came before the connection ended.
+    """Return the `size` bytes that answer a request, or fewer if the connection ends before.
 
-    Raises LinkLost when nothing answers at the IP address, or not all by the deadline.
+    Raises LinkLost without a complete answer by the deadline.
     """
     absence, advice = "no whole answer", "check the address and the tcp port"
     with _call(address, port, deadline, f"{address}, TCP port {port}", absence, advice) as call:
@@ -71,7 +71,7 @@ def tcp_answer(address: str, port: int, request: bytes, size: int, deadline: Dea
 
 
 class _Call(io.RawIOBase):
-    """A connection to a port of an IP address, whose every wait ends by a deadline. Reading raises OSError."""
+    """A connection to a port of an IP address; every wait ends by a deadline. Reading raises OSError."""
 
     def __init__(self, address: str, port: int, deadline: Deadline) -> None:
         """Connect. Raises OSError."""
@@ -79,7 +79,7 @@ class _Call(io.RawIOBase):
         self._socket = socket.create_connection((address, port), timeout=self._remaining())
 
     def ask(self, request: bytes) -> io.BufferedReader:
-        """Send all of a request, and return what its answer is read from. Raises OSError."""
+        """Send a request, and return the reader of its answer. Raises OSError."""
         self._socket.settimeout(self._remaining())
         self._socket.sendall(request)
         return io.BufferedReader(self)
@@ -87,13 +87,13 @@ class _Call(io.RawIOBase):
     def readable(self) -> bool:
         return True
 
-    def readinto(self, buffer: Any, /) -> int:  # noqa: ANN401  whatever has a buffer
+    def readinto(self, buffer: Any, /) -> int:  # noqa: ANN401  any buffer
         while True:
             self._socket.settimeout(min(self._remaining(), TICK))
             try:
                 return self._socket.recv_into(buffer)
             except TimeoutError:
-                continue  # a stop may be wanted, and the deadline may be over
+                continue  # check for a stop and for the deadline
 
     def close(self) -> None:
         self._socket.close()
@@ -109,7 +109,7 @@ class _Call(io.RawIOBase):
 
 @contextlib.contextmanager
 def _call(address: str, port: int, deadline: Deadline, location: str, absence: str, advice: str) -> Generator[_Call]:
-    """Call a port. Raises LinkLost for a failure of the network: it says where, what is missing and what to do."""
+    """Connect to a port. Raises LinkLost for network failures, with place, missing answer and remedy."""
     try:
         with _Call(address, port, deadline) as call:
             yield call
@@ -121,7 +121,7 @@ def _call(address: str, port: int, deadline: Deadline, location: str, absence: s
 
 @dataclass(frozen=True, slots=True)
 class HttpAnswer:
-    """What a web page answered."""
+    """Answer of a web page."""
 
     status: int
     body: bytes
@@ -130,7 +130,7 @@ class HttpAnswer:
 def http_get(address: str, port: int, path: str, deadline: Deadline) -> HttpAnswer:
     """Return the answer to one GET; the whole exchange ends by the deadline.
 
-    Redirects are not followed. Raises LinkLost where no HTTP of at most MOST_BODY answers at the address in time.
+    Redirects are not followed. Raises LinkLost without an HTTP answer of at most MOST_BODY bytes in time.
     """
     location = f"http://{address}:{port}{path}"
     with _call(address, port, deadline, location, "no answer", "check power, cable and address") as call:
@@ -139,7 +139,7 @@ def http_get(address: str, port: int, path: str, deadline: Deadline) -> HttpAnsw
 
 
 def _answer(reader: io.BufferedReader, location: str) -> HttpAnswer:
-    """Read one HTTP/1.0 answer: to its stated length, or else to the end of the connection."""
+    """Read one HTTP/1.0 answer: up to its stated length, or to the end of the connection."""
     no_page = LinkLost(f"{location} does not answer as a web page does; check the address and the http port")
     header = b""
     while not header.endswith(b"\r\n\r\n"):
@@ -162,9 +162,9 @@ def _answer(reader: io.BufferedReader, location: str) -> HttpAnswer:
 
 
 def resolve(host: str, deadline: Deadline) -> str:
-    """Return the IPv4 address of a host's name. Raises SetupError when it has none, or none is found in time.
+    """Return the IPv4 address of a host. Raises SetupError when none is found in time.
 
-    It is asked for once, at opening: a name server that falls silent must not end a stream.
+    Called once, at opening: a failing name server must not end a stream.
     """
     hosts: list[str] = []
 
@@ -172,7 +172,7 @@ def resolve(host: str, deadline: Deadline) -> str:
         with contextlib.suppress(OSError, UnicodeError):
             hosts.append(socket.gethostbyname(host))
 
-    search = threading.Thread(target=look, name=f"looking for {host}", daemon=True)  # the system's search has no limit
+    search = threading.Thread(target=look, name=f"looking for {host}", daemon=True)  # the system's lookup has no limit
     search.start()
     while search.is_alive() and (remaining_s := deadline.remaining) > 0.0:
         search.join(min(remaining_s, TICK))

@@ -1,4 +1,4 @@
-"""How makers write things: numbers with a point, units by name, and XML without declarations."""
+"""Parsing of makers' notation: numbers with a decimal point, units by name, XML without declarations."""
 
 import math
 import re
@@ -20,12 +20,12 @@ TORQUE = {"Nmm": 1.0, "Nm": 1e3, "kNm": 1e6, "kgcm": 98.0665, "kgfcm": 98.0665} 
 
 
 def number(text: str) -> float:
-    """Return a number written with a point, or nan: no other spelling, whatever the language of the computer."""
+    """Return a number with a decimal point, or nan for any other spelling, independent of the locale."""
     return float(text) if len(text) <= 40 and _NUMBER.fullmatch(text) else math.nan
 
 
 def unit(text: str, units: Mapping[str, float]) -> float | None:
-    """Return the size of a unit, however its name is written; None where it is not among `units`.
+    """Return the size of a unit, ignoring case, blanks and separators; None where it is not among `units`.
 
     >>> unit("N-m", TORQUE), unit("lbf·in", TORQUE), unit("stone", FORCE)
     (1000.0, 112.98482902761668, None)
@@ -35,14 +35,14 @@ def unit(text: str, units: Mapping[str, float]) -> float | None:
 
 
 class _Builder(ElementTree.TreeBuilder):
-    """Refuses a document type before any entity of it can grow."""
+    """Refuses a document type before any of its entities expands."""
 
     def doctype(self, *_: object) -> None:
         raise ElementTree.ParseError("it declares a document type")
 
 
 def parse_xml(data: bytes) -> ElementTree.Element:
-    """Return the root of an XML document. Raises ValueError, whose message follows the document's name."""
+    """Return the root of an XML document. Raises ValueError, with a message to follow the document's name."""
     parser = ElementTree.XMLParser(target=_Builder())
     try:
         parser.feed(data)

@@ -1,4 +1,4 @@
-"""Raw readings: the blocks a transducer gives, and the records that a decoder makes of a stream."""
+"""Raw readings: the blocks of a transducer, and the records that a decoder makes from a stream."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
@@ -14,11 +14,11 @@ class ReadingBlock:
     """Consecutive readings of one transducer; n of them, possibly none. Arrays are read-only."""
 
     sequence: Indices  # (n,) record number given by the device, unwrapped; missing numbers are lost readings
-    counter: Indices  # (n,) the device's own clock ticks, unwrapped (its rate: `TransducerInfo.counter_rate`)
+    counter: Indices  # (n,) ticks of the device's own clock, unwrapped (its rate: `TransducerInfo.counter_rate`)
     status: Indices  # (n,) status word as the device sent it, 0 = healthy
     time: Array  # (n,) [s] on the device's clock, 0 at the first reading of the stream
     received_ns: Indices  # (n,) [ns] session clock when the reading's bytes arrived
-    raw: Array  # (n, 6) six raw numbers: counts or volts (`Calibration.raw_unit`), exactly representable
+    raw: Array  # (n, 6) six raw values: counts or volts (`Calibration.raw_unit`), exactly representable
 
     def __post_init__(self) -> None:
         n = len(self.sequence)
@@ -60,11 +60,11 @@ _COLUMNS = tuple(field.name for field in fields(ReadingBlock))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Records:
-    """Whole records in the order they came; n of them, possibly none."""
+    """Whole records in order of arrival; n of them, possibly none."""
 
-    raw: Array  # (n, 6) six raw numbers
+    raw: Array  # (n, 6) six raw values
     status: Indices  # (n,) as the device sent it, 0 = healthy
-    damaged: Indices  # (n,) records that came broken between the one before and this one
+    damaged: Indices  # (n,) broken records between the previous one and this one
 
     @staticmethod
     def of(raw: Sequence[tuple[float, ...]], status: list[int], damaged: list[int]) -> "Records":
@@ -75,11 +75,11 @@ class Records:
 
 
 class RecordDecoder(Protocol):
-    """Turns the bytes of one stream into records, however the bytes were cut. Never raises."""
+    """Turns the bytes of one stream into records, independently of how the bytes are split. Never raises."""
 
     @property
     def malformed(self) -> int:
-        """Records that came broken so far, those at the end of the stream included."""
+        """Broken records so far, including those at the end of the stream."""
 
     def feed(self, data: bytes) -> Records:
-        """Take what arrived and return every record it completes."""
+        """Take bytes and return every record they complete."""

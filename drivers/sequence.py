@@ -1,9 +1,9 @@
-"""Lost, repeated, late and frozen records, from a record's number and the device's own counter alone.
+"""Detection of lost, repeated, late and frozen records from record numbers and the device's counter alone.
 
-Record k of an undisturbed stream has number a + k and counter b + k·step, both modulo 2**32: it lies on a line. A
-record on the line is judged at once. One off the line is held until the next says who is right: if the next goes on
-from the held one, the stream itself has moved (it was started anew, the device rebooted, its rate was changed, its
-counter stood still for a while); if not, the held one was garbage and must not move anything.
+Record k of an undisturbed stream has number a + k and counter b + k·step, both modulo 2**32: it is on a line. A record
+on the line is judged immediately. One off the line is held until the next. If the next continues the held one, the
+stream itself has moved (a new start, a reboot, a changed rate, a frozen counter); if not, the held one was garbage and
+must not move anything.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from drivers.arrays import Indices
 
 WRAP = 2**32
-_NEAR = 10_000  # farthest number behind at which a rejected record was late; beyond, it was garbage
+_NEAR = 10_000  # greatest distance behind at which a rejected record counts as late; beyond, as garbage
 
 Words = NDArray[np.uint32]  # as sent
 Relation = Literal["same", "next", "frozen", "behind", "off"]
@@ -29,19 +29,19 @@ class Accounting:
     positions: NDArray[np.intp]  # (k,) in the batch
     sequence: Indices  # (k,) their numbers, unwrapped; a missing number is a lost record
     counter: Indices  # (k,) the device's counter, unwrapped and never running backwards
-    undecided: bool  # the batch's last record: put it at the head of the next batch
+    undecided: bool  # the batch's last record: it belongs at the head of the next batch
 
 
 @dataclass(frozen=True, slots=True)
 class _Record:
-    """Where the stream stood at one record."""
+    """State of the stream at one record."""
 
     number: int  # as sent, 0 .. WRAP - 1
     counter: int
     received_ns: int
 
     def since(self, previous: "_Record") -> tuple[int, int]:
-        """Return how many numbers and ticks it lies ahead of one before."""
+        """Return the differences of number and counter from an earlier record."""
         return _signed_difference(self.number - previous.number), _signed_difference(self.counter - previous.counter)
 
 
@@ -49,9 +49,9 @@ class SequenceAccount:
     """Judges the records of one stream in the order in which they arrived."""
 
     def __init__(self, step: int | None, counter_rate: float, first: int = 1) -> None:
-        """Expect the first record to have number `first`, and counters `step` apart (None: learn it from the stream).
+        """Expect a first record with number `first`, and counters `step` apart (None: learned from the stream).
 
-        `counter_rate` [Hz] turns host time into ticks, once: to bridge a reboot, whose length the device cannot tell.
+        `counter_rate` [Hz] converts host time into ticks, only to bridge a reboot: the device does not know its length.
         """
         self.step = step
         self.lost = 0
@@ -60,7 +60,7 @@ class SequenceAccount:
         self.garbage = 0
         self.frozen = 0
         self.restarted = 0
-        self.changed = 0  # times the records' distance in ticks became another
+        self.changed = 0  # number of changes of the step
         self._counter_rate = counter_rate
         self._first = first
         self._last: _Record | None = None
@@ -68,7 +68,7 @@ class SequenceAccount:
         self._counter = 0
 
     def take(self, numbers: Words, counters: Words, received_ns: Sequence[int], *, end: bool = False) -> Accounting:
-        """Judge a batch of n records: their numbers (n,), counters (n,) and when they arrived (n) [ns].
+        """Judge a batch of n records by their numbers (n,), counters (n,) and arrivals (n) [ns].
 
         With `end` no further batch will come, and nothing is held back.
         """
@@ -79,11 +79,11 @@ class SequenceAccount:
         )
 
     def _on_the_line(self, numbers: Words, counters: Words, received_ns: Sequence[int]) -> Accounting | None:
-        """Return the verdict when every record lies ahead on the line, gaps or not, and None otherwise."""
+        """Return the verdict if every record is ahead on the line, with or without gaps, else None."""
         last = self._last
         if last is None or self.step is None:
             return None
-        ahead = np.diff(numbers, prepend=np.uint32(last.number))  # unsigned, so it wraps as the device does
+        ahead = np.diff(numbers, prepend=np.uint32(last.number))  # unsigned, so it wraps as in the device
         ticks = np.diff(counters, prepend=np.uint32(last.counter))
         if np.any((ahead == 0) | (ahead >= WRAP // 2)) or np.any(ticks != ahead * np.uint32(self.step)):
             return None
@@ -131,7 +131,7 @@ class SequenceAccount:
         return Accounting(np.array(positions, np.intp), table[:, 0], table[:, 1], undecided=candidate is not None)
 
     def _relation(self, previous: _Record, record: _Record, *, learning: bool = False) -> Relation:
-        """Say how a record lies to the previous one; when `learning`, one number may take any number of ticks."""
+        """Return the relation of a record to the previous one; when `learning`, the step may have any size."""
         ahead, ticks = record.since(previous)
         on_line = self.step is not None and ticks == _signed_difference(ahead * self.step)
         if ahead == 0:
@@ -156,7 +156,7 @@ class SequenceAccount:
         return False
 
     def _learn(self, record: _Record) -> None:
-        """Take the step from a record that comes right after the one just adopted."""
+        """Learn the step from the record right after the adopted one."""
         assert self._last is not None
         ahead, ticks = record.since(self._last)
         if ahead == 1 and ticks > 0:
@@ -164,7 +164,7 @@ class SequenceAccount:
             self.step = ticks
 
     def _adopt(self, record: _Record) -> None:
-        """Go on from a record off the line: the stream has moved there."""
+        """Continue from a record off the line: the stream has moved there."""
         last = self._last
         if last is None:
             self._sequence = self._first - 1
@@ -172,25 +172,25 @@ class SequenceAccount:
             return
         ahead, ticks = record.since(last)
         step = self.step or 1
-        # A device that had only just been switched on before it rebooted looks here as if it had gone on.
-        if ticks <= 0:  # the counter restarted: only the host's clock knows for how long the device was away
+        # A device that rebooted shortly after power-up looks here like one that continued.
+        if ticks <= 0:  # the counter restarted: only the host's clock shows how long the device was away
             self.restarted += 1
             away = (record.received_ns - last.received_ns) * 1e-9 * self._counter_rate
             ahead = max(round(away / step), 2)
             ticks = ahead * step
-        elif ahead <= 0:  # the same device renumbers its records: its counter shows what is missing
+        elif ahead <= 0:  # the same device renumbers its records: its counter shows the missing records
             ahead = max(round(ticks / step), 1)
         self._advance(record, ahead, ticks)
 
     def _advance(self, record: _Record, ahead: int, ticks: int) -> None:
-        """Move to `record`, which lies `ahead` numbers and `ticks` further on."""
+        """Move to `record`, `ahead` numbers and `ticks` further on."""
         self.lost += ahead - 1
         self._sequence += ahead
         self._counter += ticks
         self._last = record
 
     def _reject(self, record: _Record) -> None:
-        """Count a record that nothing went on from."""
+        """Count a record that no other continued."""
         ahead, _ = (0, 0) if self._last is None else record.since(self._last)
         if -_NEAR <= ahead < 0:
             self.late += 1
@@ -199,7 +199,7 @@ class SequenceAccount:
 
 
 def _signed_difference(difference: int) -> int:
-    """Return a difference modulo 2**32 as the nearer of its two readings, in [-2**31, 2**31).
+    """Return a difference modulo 2**32 as a signed number in [-2**31, 2**31).
 
     >>> _signed_difference(5 - (2**32 - 1)), _signed_difference(-3)
     (6, -3)

@@ -17,7 +17,7 @@ Parity = Literal["none", "even"]
 
 
 def _terminal_errors() -> tuple[type[Exception], ...]:
-    """Return what setting a port raises beside OSError; nothing on Windows."""
+    """Return the errors of port settings other than OSError; none on Windows."""
     try:
         import termios
     except ImportError:
@@ -26,15 +26,15 @@ def _terminal_errors() -> tuple[type[Exception], ...]:
 
 
 _PARITY = {"none": serial.PARITY_NONE, "even": serial.PARITY_EVEN}
-# Raised when a port is pulled out, or is used after that. pyserial's own errors are OSErrors.
+# Raised when a port is unplugged, or used after that. pyserial's own errors are OSErrors.
 _PORT_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, *_terminal_errors())
 _POSIX = os.name == "posix"
-_MOST = 65536  # bytes taken at one go
-_WRITE_PATIENCE = 0.1  # for the system to take what is sent [real s]
+_MOST = 65536  # bytes taken in one call
+_WRITE_PATIENCE = 0.1  # for the system to accept bytes [real s]
 
 
 class SerialLink:
-    """Eight data bits and one stop bit over one serial port, which nobody else can open meanwhile."""
+    """Eight data bits and one stop bit over one serial port, opened exclusively."""
 
     def __init__(self, port: str, baud: int, parity: Parity = "none") -> None:
         """Open `port` at `baud` bits a second. Raises SetupError when it is missing, busy or not permitted."""
@@ -49,7 +49,7 @@ class SerialLink:
                 stopbits=serial.STOPBITS_ONE,
                 timeout=0.0,
                 write_timeout=0.0 if _POSIX else _WRITE_PATIENCE,
-                xonxoff=False,  # binary records may hold those very bytes
+                xonxoff=False,  # binary records may contain those bytes
                 exclusive=True,
             )
         except _PORT_ERRORS as error:
@@ -58,7 +58,7 @@ class SerialLink:
     def send(self, data: bytes) -> None:
         try:
             while data:
-                # pyserial's own time for writing runs out where this computer is busy.
+                # pyserial's own write timeout expires on a busy computer.
                 if _POSIX and not select.select([], [self._port.fileno()], [], _WRITE_PATIENCE)[1]:
                     raise OSError
                 data = data[self._port.write(data) :]
@@ -78,17 +78,17 @@ class SerialLink:
             raise LinkLost(f"{self._port_name} is gone; check that its plug is in") from None
 
     def close(self) -> None:
-        with contextlib.suppress(*_PORT_ERRORS):  # it was pulled out
+        with contextlib.suppress(*_PORT_ERRORS):  # unplugged
             self._port.close()
 
 
 def serial_ports() -> tuple[str, ...]:
-    """Return the serial ports of this computer that a device is plugged into; none of them is opened."""
+    """Return the serial ports with a device plugged in, without opening them."""
     return tuple(sorted(port.device for port in list_ports.comports() if port.vid is not None))
 
 
 def port_of(address: Address) -> str:
-    """Return the serial port an address names. Raises SetupError when it names none.
+    """Return the serial port in an address. Raises SetupError without one.
 
     >>> from drivers.address import parse_address
     >>> port_of(parse_address("serial-ft:///dev/ttyUSB0?baud=38400")), port_of(parse_address("serial-ft://COM3"))

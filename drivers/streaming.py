@@ -1,4 +1,4 @@
-"""A transducer that streams records without full numbers: thread, times, loss, return. A `Conversation` runs it."""
+"""A transducer that streams records without full numbers: thread, times, losses, reconnection."""
 
 import contextlib
 import math
@@ -18,47 +18,47 @@ from drivers.transducer import Health, LinkLost, SetupError, TransducerInfo
 
 # All in real seconds.
 _GATHER = 0.002  # at fast rates, time in which bytes gather before they are read
-_LUMP = 2048  # bytes at once from which the computer was busy, and more may be waiting
-_FIRST = 3.0  # until a device that never sent a record is given up, beyond its start-up time
+_LUMP = 2048  # bytes in one read from which the computer was busy and more may be waiting
+_FIRST = 3.0  # until a device that never sent a record is given up, after its start-up time
 _QUIET = 0.3  # time without a complete record after which the device is asked to stream again
 _SILENCE = 5.0  # time without a complete record after which it is given up
-_LOOKS = 12  # at a rate that is to be measured, until one says what those before it did
+_LOOKS = 12  # most measurements of a rate, until one agrees with the earlier ones
 _ALIKE = 0.03  # relative difference below which rates are equal [-]
-_BACK_OFF = (0.05, 0.1, 0.2, 0.4)  # between attempts to bring it back; the last one repeats
+_BACK_OFF = (0.05, 0.1, 0.2, 0.4)  # between attempts to reconnect; the last one repeats
 
 
 class Conversation(Protocol):
     """The exchange over one kind of line around a stream."""
 
     def begin(self, link: Link) -> bytes:
-        """Bring the device to stream, whatever it was doing; return what it streamed already.
+        """Start the stream from any state of the device; return its first bytes.
 
-        Raises LinkLost when it does not answer, DeviceFault when it must not be read: the message says why.
+        Raises LinkLost without an answer, DeviceFault, with the reason, when it must not be read.
         """
 
     def end(self, link: Link) -> None:
-        """Bring the stream to an end within 0.1 s. Raises LinkLost when the device is gone, and streams no more."""
+        """End the stream within 0.1 s. Raises LinkLost when the device is gone."""
 
     @property
     def decoder(self) -> Callable[[], RecordDecoder]:
-        """What makes a decoder for a stream about to begin."""
+        """Factory of decoders, one for each stream."""
 
     @property
     def numbering(self) -> Callable[[float, float], ClockRecovery | ScanCount]:
-        """What makes the numbering of a stream, of its rate [Hz] and how many times as fast as real its clock runs."""
+        """Factory of a stream's numbering from its rate [Hz] and the factor of its clock to real time."""
 
 
 def measured_rate(
     link: Link, conversation: Conversation, clock: Clock, seconds: float, deadline: Deadline, nominal: float = math.nan
 ) -> float:
-    """Return how many records a second of the session's clock come [Hz], from `seconds` of streaming [real s].
+    """Return the rate of records on the session's clock [Hz], from `seconds` of streaming [real s].
 
-    Good to a few per cent. Where it is not the rate `nominal`, and the last half of the time says another than all
-    before it, the computer may have been busy: the stream is watched for longer, up to the deadline. Raises LinkLost
-    when hardly any records come, and what `conversation.begin` raises.
+    Good to a few per cent. If the rate is not `nominal`, and the last half of the time disagrees with all before it,
+    the computer may have been busy: measurement continues, up to the deadline. Raises LinkLost with hardly any records,
+    and the errors of `conversation.begin`.
     """
     decoder = conversation.decoder()
-    arrivals: list[tuple[int, int]] = []  # how many records so far, and when the last of them came [ns]
+    arrivals: list[tuple[int, int]] = []  # number of records so far, and arrival of the last one [ns]
     rate, count = math.nan, 0
     try:
         data: bytes | None = conversation.begin(deadline.bound(link))
@@ -89,10 +89,10 @@ def _end_stream(conversation: Conversation, link: Link) -> None:
 
 
 class StreamingTransducer(ThreadedTransducer):
-    """One device at the end of a line that is opened at each start. A thread takes and decodes what comes.
+    """One device at the end of a line that is opened at each start. A thread takes and decodes its bytes.
 
-    Number and time of each record come from the conversation's numbering. `counter` is the number. A loss is named by
-    missing numbers; so is the time in which the line was pulled or the device was off.
+    Number and time of each record come from the conversation's numbering; `counter` is the number. Missing numbers show
+    losses, including the time of an unplugged line or a device that was off.
     """
 
     longest_wait = TICK
@@ -100,7 +100,7 @@ class StreamingTransducer(ThreadedTransducer):
     def __init__(
         self, info: TransducerInfo, connect: Connect, conversation: Conversation, clock: Clock, *, opening: Deadline
     ) -> None:
-        """Take an identified device whose `info.rate` [Hz] is known within a few per cent, opened by `opening`."""
+        """Take an identified device with `info.rate` [Hz] known to a few per cent, opened within `opening`."""
         super().__init__(info, clock, opening)
         self._connect = connect
         self._conversation = conversation
@@ -134,15 +134,15 @@ class StreamingTransducer(ThreadedTransducer):
         super().reset()
         self._pending: deque[tuple[Records | None, int]] = deque()  # and arrival [ns]; None: the stream restarted
         self._numbering = self._conversation.numbering(self.info.rate, self.clock.factor)
-        self._held_back: list[tuple[Records, int]] = []  # that the numbering keeps back
+        self._held_back: list[tuple[Records, int]] = []  # held back by the numbering
         self._restarted = 0
-        self._malformed_before = 0  # by decoders that have had their day
+        self._malformed_before = 0  # by earlier decoders
         self._decoder = self._conversation.decoder()
-        self._ever = False  # a record has come
-        self._last_arrival = time.monotonic()  # when the last one did
+        self._ever = False  # a record has arrived
+        self._last_arrival = time.monotonic()  # of the last one
 
     def run(self) -> None:
-        """Bring the device to stream, take what comes, and bring it back when it is lost."""
+        """Start the stream, take records, and reconnect after a loss."""
         tries = 0
         while not self.stopping.is_set():
             try:
@@ -155,7 +155,7 @@ class StreamingTransducer(ThreadedTransducer):
                 self.stopping.wait(_BACK_OFF[min(tries, len(_BACK_OFF) - 1)])
 
     def _stream(self) -> None:
-        """Stream over one opening of the line until asked to stop. Raises LinkLost when no records come any more."""
+        """Stream over one opening of the line until a stop. Raises LinkLost when no more records arrive."""
         limit = Deadline(CONNECTING, self.stopping) if self._ever else self.begin_by
         link = self._connect(limit)
         try:
@@ -173,14 +173,14 @@ class StreamingTransducer(ThreadedTransducer):
             link.close()
 
     def _listen(self, link: Link, decoder: RecordDecoder, data: bytes | None) -> None:
-        """Decode what comes. A pause of the device is waited out as long as it may be one."""
+        """Decode arriving bytes. A pause of the device is waited out up to a limit."""
         quiet = (_QUIET if self._ever else _FIRST) + 4.0 * self._period
         silence, last_look = 0.0, time.monotonic()
         while True:
             received_ns = self.clock.now_ns()
             records = decoder.feed(data) if data else None
             now = time.monotonic()
-            silence += min(now - last_look, TICK + _GATHER)  # beyond that this computer was busy, and records may wait
+            silence += min(now - last_look, TICK + _GATHER)  # beyond that this computer was busy: records may wait
             last_look = now
             if records is not None and len(records.status):
                 self._pending.append((records, received_ns))
@@ -211,7 +211,7 @@ class StreamingTransducer(ThreadedTransducer):
             self._hand_on(self._numbering.release())
 
     def _hand_on(self, placement: Placement) -> None:
-        """Return a block of all arrivals that the numbering has placed."""
+        """Hand over a block of all arrivals that the numbering has placed."""
         if not len(placement.sequence):
             return
         batches, received_ns = zip(*self._held_back, strict=True)

@@ -1,4 +1,4 @@
-"""What all drivers share whose readings a thread of their own takes: beginning, handing over, stopping, closing."""
+"""Base of drivers with a reading thread: start, handing over, stop and close."""
 
 import threading
 import time
@@ -11,27 +11,27 @@ from drivers.deadline import Deadline, Stopped
 from drivers.readings import ReadingBlock
 from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, StatusCount, TransducerInfo
 
-_LEAVING = 0.9  # for the thread to end, until it is left alone with a device that holds it [real s]
+_LEAVING = 0.9  # for the thread to end before it is abandoned in a call to its device [real s]
 
 
 class ThreadedTransducer(ABC):
-    """One device whose thread, begun by `start`, takes what comes until `stopping` is set."""
+    """One device whose thread, begun by `start`, takes data until `stopping` is set."""
 
-    longest_wait = 0.05  # longest wait, and so for a stop [real s]
+    longest_wait = 0.05  # longest wait, and so the longest delay of a stop [real s]
 
     def __init__(self, info: TransducerInfo, clock: Clock, opening: Deadline | None = None) -> None:
-        """Take an identified device, to be reset. What its opening took is taken off the time for its first start."""
+        """Take an identified device; subclasses call `reset`. The time of `opening` counts for the first start."""
         self._spent = 0.0 if opening is None else opening.spent
-        self.info = info  # as found at opening
+        self.info = info  # from opening
         self.clock = clock
         self.lock = threading.Lock()  # over all that `digest` touches
         self.news = threading.Event()  # something is pending, or the stream has ended
         self.stopping = threading.Event()
         self._thread: threading.Thread | None = None
-        self._last_thread: threading.Thread | None = None  # the thread that was stopped last, which a device may hold
+        self._last_thread: threading.Thread | None = None  # stopped last; may still wait for the device
 
     def totals(self, **counts: Any) -> Health:  # noqa: ANN401 - fields of Health
-        """Return totals: those that all drivers count, and `counts`. The lock is held."""
+        """Return totals: those of all drivers, and `counts`. Call with the lock held."""
         statuses = self._statuses
         return Health(
             received=self._received,
@@ -44,13 +44,13 @@ class ThreadedTransducer(ABC):
         )
 
     def hand_over(self, block: ReadingBlock) -> None:
-        """Let these readings be read. The lock is held."""
+        """Make readings available to `read`. Call with the lock held."""
         self._received += len(block)
         self._statuses.take(block.status)
         self._ready.append(block)
 
     def start(self) -> None:
-        """Bring the device to stream. Raises LinkLost, SetupError or DeviceFault when no reading comes in time."""
+        """Start the stream. Raises LinkLost, SetupError or DeviceFault when no reading arrives in time."""
         self.reset()
         patience, self._spent = deadline.CONNECTING - self._spent, 0.0
         first_reading_by, self.begin_by = Deadline(patience), Deadline(patience, self.stopping)
@@ -69,7 +69,7 @@ class ThreadedTransducer(ABC):
             raise
 
     def check_first(self) -> None:
-        """Raise why the stream cannot be used, where it cannot. A loss after readings came is left to `read`."""
+        """Raise an error if the stream is unusable. A loss after the first readings is left to `read`."""
         if self.ended is not None and not (isinstance(self.ended, LinkLost) and self.has_come()):
             raise self.ended
 
@@ -93,7 +93,7 @@ class ThreadedTransducer(ABC):
             self.news.wait(min(remaining_s, self.longest_wait))
 
     def reset(self) -> None:
-        """Forget what an earlier stream left. Raises SetupError while one runs, or has not let go of the device."""
+        """Clear the state of an earlier stream. Raises SetupError while one runs or still holds the device."""
         if self._thread is not None:
             raise SetupError(f"{self.info.uri} is streaming already; stop it before starting it again")
         if self._last_thread is not None and self._last_thread.is_alive():
@@ -116,44 +116,44 @@ class ThreadedTransducer(ABC):
         self.stop()
 
     def _run(self) -> None:
-        """Be the thread, and put down in `ended` why the stream ended, where nobody stopped it."""
+        """Run the thread, and store in `ended` why the stream ended, unless it was stopped."""
         try:
             self.run()
         except Stopped:
             pass
         except (LinkLost, SetupError, DeviceFault) as error:
             self.ended = error if self.info.uri in str(error) else type(error)(f"{self.info.uri}: {error}")
-        except Exception as error:  # noqa: BLE001 - an error of ours must not look like a device that is silent
+        except Exception as error:  # noqa: BLE001 - an internal error must not look like a silent device
             self.ended = LinkLost(f"{self.info.uri}: unexpected {type(error).__name__} ({error}); open it anew")
         finally:
             self.news.set()
 
     @abstractmethod
     def run(self) -> None:
-        """Bring the device to stream by `begin_by`, and take what comes until `stopping` is set.
+        """Start the stream by `begin_by`, and take data until `stopping` is set.
 
-        Raises why the stream ended, where nobody stopped it: LinkLost, SetupError, DeviceFault.
+        Raises LinkLost, SetupError or DeviceFault if the stream ends without a stop.
         """
 
     @abstractmethod
     def has_come(self) -> bool:
-        """Tell whether a reading has come."""
+        """Say whether a reading has arrived."""
 
     @abstractmethod
     def never_came(self, seconds: float) -> str:
-        """Return why no reading came within `seconds`, in a sentence."""
+        """Return a sentence on why no reading arrived within `seconds`."""
 
     @abstractmethod
     def digest(self, *, end: bool = False) -> None:
-        """Turn what the thread has taken into readings that are ready; nothing more comes at the `end`. Lock held."""
+        """Turn data of the thread into readings; no more follow at the `end`. Call with the lock held."""
 
 
 def _await_end(thread: threading.Thread, limit: Deadline) -> None:
-    """Wait for a thread to end, also where its start was broken off and it has not begun to run."""
+    """Wait for a thread to end, even if its start was interrupted before it ran."""
     while limit.remaining > 0.0:
         try:
             thread.join(limit.remaining)
-        except RuntimeError:  # join takes no thread that has not begun
+        except RuntimeError:  # join refuses a thread that has not started
             time.sleep(deadline.TICK)
         else:
             return

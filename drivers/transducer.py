@@ -1,4 +1,4 @@
-"""What every six-axis transducer can do, whatever its wire, what the bits of its status mean, and how it fails."""
+"""The interface of all six-axis transducers, the meaning of their status bits, and their errors."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from drivers.arrays import Indices, Mask
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 
-Verdict = Literal["saturated", "doubtful", "note"]  # values invalid; values not to be trusted; nothing against them
+Verdict = Literal["saturated", "doubtful", "note"]  # values invalid; values doubtful; values fine
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,23 +25,23 @@ class StatusBit:
 
 
 def bit(number: int, words: str, verdict: Verdict) -> StatusBit:
-    """Return the entry of one bit, 0 being the lowest."""
+    """Return the entry of one bit; 0 is the lowest."""
     return StatusBit(1 << number, 1 << number, words, verdict)
 
 
 @dataclass(frozen=True, slots=True)
 class StatusTable:
-    """A maker's table of status bits, the gravest first. A bit that is in no entry is doubtful.
+    """A maker's table of status bits, most serious first. A bit without an entry is doubtful.
 
-    Where nothing but notes is listed, as in early recordings, a fault looks like values out of range: then
-    such a bit makes the values invalid, whichever it is.
+    If only notes are listed, as in early recordings, faults are indistinguishable from values out of range: then such a
+    bit makes the values invalid.
     """
 
     bits: tuple[StatusBit, ...] = ()
-    summary: int = 0  # bit that is set beside any other, and says nothing beside another
+    summary: int = 0  # bit set with any other bit, without a meaning of its own then
 
     def entries(self, status: int) -> tuple[StatusBit, ...]:
-        """Return what a status says; nothing when the device is healthy."""
+        """Return the entries of a status; empty when the device is healthy."""
         entries = [entry for entry in self.bits if status & entry.mask == entry.value]
         unnamed = status & ~self.summary
         for entry in entries:
@@ -54,20 +54,20 @@ class StatusTable:
         return tuple(entries)
 
     def words(self, status: int) -> tuple[str, ...]:
-        """Return the words of a status; none when the device is healthy."""
+        """Return the words of a status; empty when the device is healthy."""
         return tuple(entry.words for entry in self.entries(status))
 
     def verdict(self, status: int) -> Verdict | None:
-        """Return what a status says of the values, the gravest of all that is set; None when the device is healthy."""
+        """Return the most serious verdict of a status on the values; None when the device is healthy."""
         verdicts = {entry.verdict for entry in self.entries(status)}
         return next((candidate for candidate in ("saturated", "doubtful", "note") if candidate in verdicts), None)
 
     def doubtful(self, status: Indices) -> Mask:
-        """Tell of each status (n,) whether it speaks against the reading's six values."""
+        """Mark each status (n,) that makes the reading's six values invalid or doubtful."""
         return self._mask(status, ("saturated", "doubtful"))
 
     def faulty(self, status: Indices) -> Mask:
-        """Tell of each status (n,) whether it speaks of a fault of the device, and not of values out of range."""
+        """Mark each status (n,) that shows a fault of the device, not values out of range."""
         return self._mask(status, ("doubtful",))
 
     def _mask(self, status: Indices, verdicts: tuple[Verdict, ...]) -> Mask:
@@ -78,20 +78,20 @@ class StatusTable:
 
     @property
     def harmless(self) -> int:
-        """Bits that say nothing against a reading's six values."""
+        """Bits that do not affect a reading's six values."""
         return sum(entry.mask for entry in self.bits if entry.verdict == "note")
 
 
 @dataclass(slots=True)
 class StatusCount:
-    """Counts readings by what their status says."""
+    """Counts readings by their status."""
 
     table: StatusTable
     verdicts: Counter[Verdict] = field(default_factory=Counter[Verdict])
     flagged: Counter[str] = field(default_factory=Counter[str])  # by the words of each entry
 
     def take(self, status: Indices) -> None:
-        """Count readings of these statuses (n,)."""
+        """Count readings with these statuses (n,)."""
         if not status.any():
             return
         for value, count in zip(*(column.tolist() for column in np.unique(status, return_counts=True)), strict=True):
@@ -102,7 +102,7 @@ class StatusCount:
 
 
 def flagged_words(flagged: Mapping[str, int]) -> str:
-    """Return what statuses said, the most frequent first.
+    """Return the words of statuses with their counts, most frequent first.
 
     >>> flagged_words({"HTTP error": 2, "gauge excitation current too low": 200})
     'gauge excitation current too low (200), HTTP error (2)'
@@ -112,7 +112,7 @@ def flagged_words(flagged: Mapping[str, int]) -> str:
 
 
 class SetupError(Exception):
-    """Our request was wrong or cannot be met: the address, a setting, a port already in use."""
+    """The request is wrong or impossible: the address, a setting, a port already in use."""
 
 
 class DeviceFault(Exception):
@@ -125,18 +125,18 @@ class LinkLost(Exception):
 
 @dataclass(frozen=True, slots=True)
 class TransducerInfo:
-    """Who the transducer is and how it is set, as read back from it."""
+    """Identity and settings of a transducer, as read back from it."""
 
     uri: str  # the address it was opened with
     driver: str  # name in the catalogue, e.g. "net-ft"
-    model: str  # product name as the device gives it
-    serial: str  # serial number of the calibration in force
+    model: str  # product name stated by the device
+    serial: str  # serial number of the active calibration
     simulated: bool
     rate: float  # readings a second as set and read back [Hz]; nan where unknown
     counter_rate: float  # ticks a second of the device's own counter [Hz]; nan where it has none
     calibration: Calibration
     settings: Mapping[str, str] = field(default_factory=dict[str, str])  # each setting as read back: filter, bias
-    status: StatusTable = field(default_factory=StatusTable)  # what the bits of a reading's status mean
+    status: StatusTable = field(default_factory=StatusTable)  # meanings of the status bits of readings
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,19 +144,19 @@ class Health:
     """Running totals since start. A record that arrived is in one of received, repeated, late, malformed."""
 
     received: int = 0
-    lost: int = 0  # sequence numbers that never arrived (a late one that is dropped stays lost)
+    lost: int = 0  # missing sequence numbers (a late record, which is dropped, stays lost)
     repeated: int = 0
     late: int = 0
     malformed: int = 0
-    stalled: int = 0  # records whose device counter did not move (they are kept, and counted here too)
-    restarted: int = 0  # times the device began to count from zero
-    saturated: int = 0  # readings whose status says the six values are invalid, as when out of range
-    doubtful: int = 0  # other readings whose status speaks against their values: the device has a fault
-    noted: int = 0  # other readings whose status says something, and nothing against their values
-    flagged: Mapping[str, int] = field(default_factory=dict[str, int])  # readings by what their status says, in words
-    off_units: int = 0  # readings since the units were last confirmed, when they were found to be others
-    off_rate: int = 0  # times the rate was found to be another than the one set, or than before
-    rate_words: str = ""  # what was found of it last
+    stalled: int = 0  # records with an unchanged device counter (kept, and counted as received too)
+    restarted: int = 0  # times the device's counter restarted
+    saturated: int = 0  # readings with a status that makes the six values invalid, as out of range
+    doubtful: int = 0  # other readings with a status that makes their values doubtful: a device fault
+    noted: int = 0  # other readings with a status that does not affect their values
+    flagged: Mapping[str, int] = field(default_factory=dict[str, int])  # readings by the words of their status
+    off_units: int = 0  # readings since the last confirmation of the units, when these turned out changed
+    off_rate: int = 0  # times the rate differed from the set one, or from the one before
+    rate_words: str = ""  # latest finding about it
     lag_ms: float = 0.0  # age of the newest reading when it was handed over [ms of the session's clock]
 
 
@@ -164,11 +164,11 @@ COUNTS = tuple(count.name for count in fields(Health) if count.type is int and c
 
 
 class Transducer(Protocol):
-    """A transducer that was opened. Use: start, read as often as wanted, stop; then close."""
+    """An open transducer. Use: start, read any number of times, stop; then close."""
 
     @property
     def info(self) -> TransducerInfo:
-        """Identity, calibration and settings; fixed from opening on."""
+        """Identity, calibration and settings; fixed at opening."""
 
     @property
     def health(self) -> Health:
@@ -180,18 +180,18 @@ class Transducer(Protocol):
     def read(self, timeout: float) -> ReadingBlock:
         """Return all readings not yet handed over, waiting up to `timeout` seconds [session clock] for the first.
 
-        Returns an empty block when none came in time. Raises LinkLost when the stream has ended for good.
+        Returns an empty block when none arrived in time. Raises LinkLost when the stream has ended for good.
         """
 
     def stop(self) -> None:
-        """End streaming; what had arrived can still be read. Harmless when repeated."""
+        """End streaming; readings that arrived can still be read. Harmless when repeated."""
 
     def close(self) -> None:
-        """Stop, and give back every port and thread. Harmless when repeated."""
+        """Stop, and release every port and thread. Harmless when repeated."""
 
 
 class WrappedTransducer:
-    """A transducer that is another one throughout, or another one with its own `info`."""
+    """A transducer that delegates to another one, optionally with a different `info`."""
 
     def __init__(self, inner: Transducer, info: TransducerInfo | None = None) -> None:
         self._inner = inner

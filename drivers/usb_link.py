@@ -9,20 +9,20 @@ import usb.util
 
 from drivers.transducer import LinkLost, SetupError
 
-_core: Any = usb.core  # it carries no types
+_core: Any = usb.core  # it has no types
 _util: Any = usb.util
-BACKEND: Any = None  # of pyusb: None takes the system's; a simulated bus is put here
-_PACKETS = 64  # taken at one go while they come without a pause
+BACKEND: Any = None  # of pyusb: None is the system's; tests insert a simulated bus
+_PACKETS = 64  # taken in one call while they arrive without a pause
 _PAUSE_MS = 2
 _LARGEST = 64  # bytes in a packet of a full-speed bulk endpoint
 _WRITE_MS = 300
 
 
 class UsbLink:
-    """One device, which nobody else can open meanwhile. What is received after a request is its answer."""
+    """One device, opened exclusively. The first bytes after a request are its answer."""
 
     def __init__(self, device: Any, endpoints: tuple[int, int, int], location: str) -> None:  # noqa: ANN401 - no types
-        """Take a device with `endpoints` for requests, answers and stream. Raises SetupError when it cannot be had."""
+        """Take a device with `endpoints` for requests, answers and stream. Raises SetupError when this fails."""
         self._device = device
         self._requests, self._answers, self._stream = endpoints
         self._location = location
@@ -45,7 +45,7 @@ class UsbLink:
         self._awaits_answer = True
 
     def receive(self, timeout: float) -> bytes | None:
-        """Return the answer to the request before, or what the stream brings; None when nothing came in `timeout` s."""
+        """Return the answer to the last request, or bytes of the stream; None when nothing arrived in `timeout` s."""
         awaits = self._awaits_answer
         endpoint = self._answers if awaits else self._stream
         packets: list[bytes] = []
@@ -53,7 +53,7 @@ class UsbLink:
         while len(packets) < (1 if awaits else _PACKETS):
             try:
                 packets.append(bytes(self._device.read(endpoint, _LARGEST, wait_ms)))
-                self._awaits_answer = False  # only now: who waits in short turns must still find the answer
+                self._awaits_answer = False  # only now: a caller with short timeouts must still get the answer
             except _core.USBTimeoutError:
                 break
             except _core.USBError as error:
@@ -68,7 +68,7 @@ class UsbLink:
 
 
 def devices(vendor: int, product: int) -> Sequence[Any]:
-    """Return the devices of a kind that are plugged in. Raises SetupError where USB cannot be used."""
+    """Return the plugged-in devices of a kind. Raises SetupError where USB cannot be used."""
     try:
         devices: Any = _core.find(find_all=True, idVendor=vendor, idProduct=product, backend=BACKEND)
         return tuple(devices)

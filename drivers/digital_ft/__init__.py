@@ -1,4 +1,4 @@
-"""The RS-485 transducer: finding out who answers, and the exchange around a stream."""
+"""The RS-485 transducer: identification, and the exchange around a stream."""
 
 import contextlib
 import math
@@ -19,13 +19,13 @@ from drivers.transducer import DeviceFault, LinkLost, SetupError, TransducerInfo
 
 # All in real seconds.
 _ANSWER = 0.15  # for one answer
-_PATIENCE = (1.0, 2.0, 4.0, 8.0)  # times that, for the answers to one request asked again
-_REST = 0.4  # for the transducer to come to itself after a jam; a published driver waits 0.5 to 1 s
+_PATIENCE = (1.0, 2.0, 4.0, 8.0)  # times that, for repetitions of one request
+_REST = 0.4  # for the transducer to recover after a jam; a published driver waits 0.5 to 1 s
 _END = 0.08  # for a jammed stream to fall silent
 _SILENT = 0.02
 _TRIES = 4  # with a rest after each, within the time for opening
-_MEASURED = 0.5  # for how long the stream is watched to learn its rate [real s]
-_AS_STATED = 0.03  # a measured rate this near to the stated one is that [-]
+_MEASURED = 0.5  # measurement of the stream's rate [real s]
+_AS_STATED = 0.03  # relative difference below which a measured rate counts as the stated one [-]
 _OPTIONS = frozenset({"baud", "parity", "calibration"})
 
 
@@ -52,7 +52,7 @@ def open_digital_ft(address: Address, clock: Clock, deadline: Deadline) -> Strea
 
 
 def identify_digital_ft(address: Address, deadline: Deadline) -> TransducerInfo:
-    """Return who answers, changing nothing: a stream left over from before goes on. An answer takes 0.2 s at most."""
+    """Return the transducer's info, changing nothing: an earlier stream continues. An answer takes 0.2 s at most."""
     target = _target_of(address)
     with prefix_failures(address), contextlib.closing(deadline.bound(_line(target, deadline))) as link:
         word = status_word(link)
@@ -118,10 +118,10 @@ def _target_of(address: Address) -> _Target:
 
 @dataclass(eq=False)
 class _DigitalConversation:
-    """Requests, answers and streams of one transducer with one of its calibrations."""
+    """The exchange with one transducer that uses one of its calibrations."""
 
     number: int  # of the calibration, 1 to 16
-    stored: wire.StoredCalibration  # as it was read
+    stored: wire.StoredCalibration  # as read
     word: int = 0  # the status word, which can only be read while nothing streams
     numbering = ClockRecovery
 
@@ -129,9 +129,9 @@ class _DigitalConversation:
         return wire.StreamDecoder(self.word)
 
     def begin(self, link: Link) -> bytes:
-        """Put the calibration's gains and offsets in force, prove it, and let the transducer stream.
+        """Apply the calibration's gains and offsets, verify them, and start the stream.
 
-        Raises LinkLost when it does not answer, DeviceFault when another transducer does or it refuses.
+        Raises LinkLost without an answer, DeviceFault when another transducer answers or it refuses.
         """
         self.word = hold(link)
         stored = read(link, wire.calibration_address(self.number), wire.CALIBRATION_SIZE)
@@ -161,7 +161,7 @@ class _DigitalConversation:
 
 
 def hold(link: Link) -> int:
-    """Return the status word, after ending a stream left over from before. Raises LinkLost when nobody answers."""
+    """Return the status word, after ending an earlier stream. Raises LinkLost without an answer."""
     for _ in range(_TRIES):
         if (word := status_word(link)) is not None:
             return word
@@ -172,7 +172,7 @@ def hold(link: Link) -> int:
 
 
 def status_word(link: Link) -> int | None:
-    """Return the status word, or None when there is no answer: it is not there, or it streams."""
+    """Return the status word, or None without an answer: the transducer is absent, or streams."""
     request = wire.read_registers(wire.STATUS, 1)
     answer = wire.answer_in(_response(link, request, b""), request)
     return struct.unpack(">H", answer)[0] if isinstance(answer, bytes) else None
@@ -189,17 +189,17 @@ def read(link: Link, first: int, count: int) -> bytes:
 
 
 def _carry_out(link: Link, request: bytes, action: str) -> None:
-    """Carry out a request whose answer says success or repeats what was written."""
+    """Carry out a request whose answer states success or repeats the registers written."""
     answer = _answer(link, request, action)
     if request[1] == wire.UNLOCK and answer != b"\x01":
         raise DeviceFault(f"the transducer was asked {action} and refused; switch it off and on")
 
 
 def _answer(link: Link, request: bytes, action: str) -> bytes:
-    """Return the answer to a request, asking again where none comes. Raises LinkLost or DeviceFault."""
+    """Return the answer to a request, which is repeated without an answer. Raises LinkLost or DeviceFault."""
     for times in _PATIENCE:
         answer = wire.answer_in(_response(link, request, b"", times * _ANSWER), request)
-        if times > 1.0:  # answers say not to what: one more to the same request must not be taken for another's
+        if times > 1.0:  # answers do not name their request: a second answer must not count for the next one
             while link.receive(_ANSWER) is not None:
                 pass
         if isinstance(answer, str):
@@ -210,7 +210,7 @@ def _answer(link: Link, request: bytes, action: str) -> bytes:
 
 
 def _response(link: Link, request: bytes, expected: bytes, patience: float = _ANSWER) -> bytes:
-    """Return what comes after a request, up to an answer to it, or to the bytes expected where there are some."""
+    """Return the bytes after a request, up to its answer, or up to the bytes `expected` if any."""
     deadline = time.monotonic() + _ANSWER
     while link.receive(0.0) and time.monotonic() < deadline:
         pass  # left over from before
@@ -219,7 +219,7 @@ def _response(link: Link, request: bytes, expected: bytes, patience: float = _AN
     deadline = time.monotonic() + patience
     while True:
         remaining_s = deadline - time.monotonic()
-        response += link.receive(max(remaining_s, 0.0)) or b""  # also where this computer was busy until now
+        response += link.receive(max(remaining_s, 0.0)) or b""  # even if this computer was busy until now
         if remaining_s <= 0.0 or (expected in response if expected else wire.answer_in(response, request) is not None):
             return response
 

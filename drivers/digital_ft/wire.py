@@ -1,7 +1,7 @@
 """Modbus frames, calibration registers and stream packets of the RS-485 transducer (manual 9620-05-Digital FT, ch. 8).
 
-The manual itself was not at hand: layouts are those of a published driver that cites it. The codes of the units in a
-calibration are taken to be those of the networked box; that, too, is not verified.
+The manual itself was not available: layouts are those of a published driver that cites it. Codes of units in a
+calibration are assumed to be those of the networked box; that is not verified either.
 """
 
 import struct
@@ -20,7 +20,7 @@ from drivers.transducer import SetupError, StatusTable, bit
 ADDRESS = 10
 READ, WRITE, START_STREAM, UNLOCK = 0x03, 0x10, 0x46, 0x6A  # function codes
 START_KEY, UNLOCK_KEY, LOCK_KEY = 0x55, 0xAA, 0x18
-MOST_REGISTERS = 64  # read at one go
+MOST_REGISTERS = 64  # in one request
 
 GAINS_AND_OFFSETS = 0x0000  # in force: six gains, then six offsets
 STATUS = 0x001D
@@ -28,12 +28,12 @@ CALIBRATIONS = 16
 CALIBRATION_SIZE = 133  # registers
 _FIRST_CALIBRATION, _CALIBRATION_STEP = 0x00E3, 192
 
-JAM = bytes(72)  # sent into a stream ends it; at least 14 bytes are said to be needed, and their value is not verified
+JAM = bytes(72)  # sent into a stream to end it; reportedly at least 14 bytes are needed; their value is not verified
 
 STREAM_RATE = 7000.0  # packets a second, good to 0.5 % [Hz]
 PACKET_SIZE = 13
 STATUS_FLAG = 0x80  # in a packet: the status word is not 0
-GAUGE_AT_END = 0x100  # put into the status here: a gauge is at the end of its range, so that all six values are invalid
+GAUGE_AT_END = 0x100  # added to the status here: a gauge is at the end of its range, so all six values are invalid
 
 _EXCEPTION = 0x80
 _REASONS = {1: "illegal function", 2: "illegal address", 3: "illegal value", 4: "device failure"}
@@ -52,7 +52,7 @@ _MEANING = {  # of the status word
     12: "thermistor too low",
     13: "converter reading out of range",
 }
-_WORD_AT = 16  # a reading with the flag holds the status word from this bit on, as it was when the stream began
+_WORD_AT = 16  # a flagged reading has the status word of the stream's start from this bit on
 STATUS_BITS = StatusTable(
     (
         bit(8, "a gauge at the end of its range", "saturated"),
@@ -62,19 +62,19 @@ STATUS_BITS = StatusTable(
 )
 _FORCE = dict(enumerate(map(FORCE.get, ("lb", "N", "klb", "kN", "kg", "g")), 1))  # by code
 _TORQUE = dict(enumerate(map(TORQUE.get, ("lbin", "lbft", "Nm", "Nmm", "kgcm", "kNm")), 1))
-_ORDER = (0, 3, 1, 4, 2, 5)  # of the gauges: where G0 to G5 stand in a packet
+_ORDER = (0, 3, 1, 4, 2, 5)  # of the gauges: positions of G0 to G5 in a packet
 _CALIBRATION = struct.Struct(">8s32s4s20s36fBB6fii6H6H")
-_PROOF = 6  # packets in a row that must be sound before a new place is believed
+_PROOF = 6  # sound packets in a row that confirm a new position
 
 
 @dataclass(frozen=True, slots=True)
 class StoredCalibration:
-    """One of the calibrations the transducer keeps."""
+    """One of the calibrations stored in the transducer."""
 
     calibration: Calibration  # raw unit: counts of the six gauges
     part_number: str
     calibrated: str  # when, as stored
-    gains_and_offsets: bytes  # of the gauges, as registers; to be put in force with this calibration
+    gains_and_offsets: bytes  # of the gauges, as registers; to be applied with this calibration
 
 
 def crc16(data: bytes) -> int:
@@ -107,10 +107,10 @@ def write_registers(first: int, registers: bytes) -> bytes:
 
 
 def answer_in(response: bytes, request: bytes) -> bytes | str | None:
-    """Return the data of the answer to `request`, wherever it lies in `response`; None while it is not there.
+    """Return the data of the answer to `request`, anywhere in `response`; None while it is missing.
 
-    For registers read that is their bytes, else what follows the function code. Where the transducer understood and
-    will not carry it out, it is a text: why. Raises nothing.
+    For a read these are the registers' bytes, else the bytes after the function code. A text gives the reason where the
+    transducer understood and refuses. Raises nothing.
     """
     function = request[1]
     size, prefix = 5, bytes([ADDRESS, function])
@@ -119,7 +119,7 @@ def answer_in(response: bytes, request: bytes) -> bytes | str | None:
     elif function == WRITE:
         size, prefix = 8, request[:6]
     for frame in _frames(response, prefix, size):
-        if frame != request:  # an adapter may repeat what we send
+        if frame != request:  # an adapter may echo the request
             return frame[3:-2] if function == READ else frame[2:-2]
     for frame in _frames(response, bytes([ADDRESS, function | _EXCEPTION]), 5):
         return _REASONS.get(frame[2], f"exception {frame[2]}")
@@ -132,7 +132,7 @@ def calibration_address(number: int) -> int:
 
 
 def parse_calibration(registers: bytes) -> StoredCalibration:
-    """Return what the registers of a calibration say. Raises SetupError, half a sentence, where it makes no sense."""
+    """Parse the registers of a calibration. Raises SetupError, half a sentence, where they are invalid."""
     serial, part_field, _, day, *numbers = _CALIBRATION.unpack(registers)
     basic = np.array(numbers[:36], np.float64).reshape(6, 6)
     force, torque = _FORCE.get(numbers[36]), _TORQUE.get(numbers[37])
@@ -157,7 +157,7 @@ def parse_calibration(registers: bytes) -> StoredCalibration:
 
 
 def status_words(status: int) -> tuple[str, ...]:
-    """Return what the set bits of the status word mean.
+    """Return the meanings of the set bits of the status word.
 
     >>> status_words(0b100010)
     ('excitation too high', 'supply too low')
@@ -166,15 +166,15 @@ def status_words(status: int) -> tuple[str, ...]:
 
 
 class StreamDecoder:
-    """Packets without any mark: their place is found, and kept, by their checksums.
+    """Decodes packets without delimiters: their position is found and tracked by their checksums.
 
-    A checksum of seven bits lets one wrong place in 128 pass. So a place is believed at first only when several
-    packets in a row are sound, and from then on a packet is a reading only when the next one is sound too. Where a
-    multiple of 13 bytes is lost inside packets, one splice in 128 still passes as a reading.
+    A seven-bit checksum lets one wrong position in 128 pass. So a position is first accepted only when several packets
+    in a row are sound, and later a packet is a reading only when the next one is sound too. Where a multiple of 13
+    bytes is lost inside packets, one splice in 128 still passes as a reading.
     """
 
     def __init__(self, word: int = 0) -> None:
-        """Start with nothing received, searching. `word` is the status word as read last, before the stream."""
+        """Start in search. `word` is the status word last read before the stream."""
         self.malformed = 0
         self._flagged = STATUS_FLAG | word << _WORD_AT
         self._buffer = b""
@@ -193,7 +193,7 @@ class StreamDecoder:
                 self._in_step = False
                 self._skip()
                 continue
-            first = 1 if self._skipped else 0  # the one behind a break may be pieced together from two
+            first = 1 if self._skipped else 0  # the first after a break may be spliced from two
             loss = -(-self._skipped // PACKET_SIZE) + first
             self.malformed += loss
             self._skipped = 0
@@ -210,7 +210,7 @@ class StreamDecoder:
         return Records(gauges, status.astype(np.int64), np.concatenate(damaged))
 
     def _skip(self) -> None:
-        """Drop bytes up to the next place where the packets in the buffer may be sound."""
+        """Drop bytes up to the next position of a possibly sound packet in the buffer."""
         data = np.frombuffer(self._buffer, np.uint8)
         windows = np.lib.stride_tricks.sliding_window_view(data[1:], PACKET_SIZE)
         sound = _sound(windows)
@@ -220,7 +220,7 @@ class StreamDecoder:
 
 
 def _sound(packets: NDArray[np.uint8]) -> Mask:
-    """Tell which of packets (n, 13) have the checksum they state."""
+    """Mark the packets (n, 13) whose checksum is right."""
     return packets[:, :12].sum(axis=1, dtype=np.uint32) & 0x7F == packets[:, 12] & 0x7F
 
 
@@ -239,6 +239,6 @@ def _frames(response: bytes, prefix: bytes, size: int) -> Iterator[bytes]:
 
 
 def _text(field: bytes) -> str:
-    """Return stored text without its padding, and without anything that cannot be shown."""
+    """Return stored text without padding and unprintable characters."""
     plain = field.split(b"\0")[0].decode("ascii", "replace")
     return "".join(character for character in plain if character.isprintable() and character != "\ufffd").strip()

@@ -1,4 +1,4 @@
-"""The LabJack U6: finding the one an address names, and the exchange around a stream of six gauge voltages."""
+"""The LabJack U6: opening by address, and the exchange around a stream of six gauge voltages."""
 
 import contextlib
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ _OPTIONS = frozenset({"serial", "cal", "rate"})
 @dataclass(frozen=True, slots=True)
 class _Target:
     uri: str
-    serial: int  # of the converter; 0: whichever is alone
+    serial: int  # of the converter; 0: the only one connected
     rate: int  # scans a second
     calibration: CalibrationFile | None
 
@@ -43,12 +43,12 @@ def open_labjack_u6(address: Address, clock: Clock, deadline: Deadline) -> Strea
     scans = wire.scan_clock(target.rate)
     conversation = _GaugeConversation(identity.serial, constants, scans)
     info = _info(target, target.calibration, identity, constants, scans)
-    target = replace(target, serial=identity.serial)  # wherever it is plugged in when it is reopened
+    target = replace(target, serial=identity.serial)  # found again at any USB port
     return StreamingTransducer(info, lambda limit: _open_link(target, limit)[0], conversation, clock, opening=deadline)
 
 
 def identify_labjack_u6(address: Address, deadline: Deadline) -> TransducerInfo:
-    """Return who answers, changing nothing. Raises SetupError where another program has it or nothing is plugged in."""
+    """Return the transducer's info, changing nothing. Raises SetupError where it is in use, LinkLost if absent."""
     target = _target_of(address)
     link, identity = _open_link(target, deadline)
     with prefix_failures(address), contextlib.closing(link):
@@ -130,7 +130,7 @@ def _target_of(address: Address) -> _Target:
 
 @dataclass(eq=False)
 class _GaugeConversation:
-    """Requests and streams of one converter. Each request is answered before anything else comes."""
+    """The exchange with one converter. Each request is answered before anything else arrives."""
 
     serial: int
     constants: wire.Constants
@@ -141,7 +141,7 @@ class _GaugeConversation:
         return wire.StreamDecoder(self.constants)
 
     def begin(self, link: Link) -> bytes:
-        """End whatever streams, set the scans and let them come. Raises LinkLost or DeviceFault with the reason."""
+        """End any stream, configure the scans and start them. Raises LinkLost or DeviceFault with the reason."""
         self.end(link)
         identity = _identity(link)
         if identity.serial != self.serial:
@@ -152,7 +152,7 @@ class _GaugeConversation:
         return b""
 
     def end(self, link: Link) -> None:
-        """Let the stream end and drop what it had still sent."""
+        """End the stream and drop its remaining bytes."""
         code = wire.normal_error(_reply(link, wire.STOP), 0xB1)
         if code not in (0, wire.STREAM_IS_OFF):
             raise DeviceFault(f"the converter does not stop: {wire.meaning(code)}; pull its plug")
@@ -161,7 +161,7 @@ class _GaugeConversation:
 
 
 def _identity(link: Link) -> wire.Identity:
-    """Return who answers. Raises LinkLost or DeviceFault when nobody does."""
+    """Return the converter's identity. Raises LinkLost or DeviceFault without a valid answer."""
     return wire.parse_identity(_reply(link, wire.read_identity()))
 
 
@@ -171,7 +171,7 @@ def _constants(link: Link) -> wire.Constants:
 
 
 def _reply(link: Link, request: bytes) -> bytes:
-    """Return the answer to a request. Raises LinkLost when there is none."""
+    """Return the answer to a request. Raises LinkLost without one."""
     link.send(request)
     answer = link.receive(_ANSWER)
     if answer is None:

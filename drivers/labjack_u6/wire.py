@@ -16,15 +16,15 @@ from drivers.readings import Records
 from drivers.transducer import DeviceFault, StatusBit, StatusTable, bit
 
 _GAUGES = 6
-SCANS = 4  # in a stream packet: whole scans, so that a lost packet does not mix the gauges up
+SCANS = 4  # in a stream packet: whole scans, so that a lost packet does not shift the gauges
 STREAM_PACKET = 14 + 2 * _GAUGES * SCANS  # bytes
-HIGHEST_RATE = 8000  # scans a second; the converter makes 50 000 readings a second at its lowest resolution
+HIGHEST_RATE = 8000  # scans a second; at its lowest resolution the converter makes 50 000 readings a second
 _LIMIT = 10.0  # of a gauge's voltage [V]: beyond, and at the ends of the converter, it is saturated
 
 STREAM_IS_OFF = 52  # answer to a stop when nothing streams
-_DRAINING = 59  # error code of packets while an overflow is being recovered from: their scans are sound
+_DRAINING = 59  # error code of packets during recovery from an overflow: their scans are sound
 _RECOVERED = 60  # error code of the packet that states how many scans an overflow cost
-_DUMMY = 0xFFFF  # all six gauges of the scan that stands for those lost
+_DUMMY = 0xFFFF  # all six gauges of the scan that replaces the lost ones
 
 START = bytes([0xA8, 0xA8])
 STOP = bytes([0xB0, 0xB0])
@@ -55,7 +55,7 @@ STATUS_BITS = StatusTable(
 
 
 class Identity(NamedTuple):
-    """Who a converter says it is."""
+    """Identity of a converter."""
 
     serial: int
     firmware: str
@@ -72,7 +72,7 @@ class ScanClock(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Constants:
-    """What turns a code of the +-10 V range into volts (blocks 0 and 2 of the converter's memory)."""
+    """Conversion of codes of the +-10 V range into volts (blocks 0 and 2 of the converter's memory)."""
 
     positive_slope: float  # [V]
     negative_slope: float  # [V], below zero
@@ -90,7 +90,7 @@ class Constants:
 
 
 def read_identity() -> bytes:
-    """Return the request for who the converter is (ConfigU6, writing nothing)."""
+    """Return the request for the converter's identity (ConfigU6, writing nothing)."""
     return _extended_command(0x08, bytes(20))
 
 
@@ -100,7 +100,7 @@ def read_memory(block: int) -> bytes:
 
 
 def configure_stream(clock: ScanClock) -> bytes:
-    """Return the request that sets six differential gauges, one after the other, to be scanned at the clock's rate."""
+    """Return the request that configures scans of six differential gauges in turn at the clock's rate."""
     header = struct.pack("<6BH", _GAUGES, 1, _GAUGES * SCANS, 0, 0, clock.flags, clock.interval)
     return _extended_command(0x11, header + b"".join(bytes([2 * gauge, _DIFFERENTIAL]) for gauge in range(_GAUGES)))
 
@@ -122,13 +122,13 @@ def scan_clock(rate: float) -> ScanClock:
 
 
 def parse_identity(answer: bytes) -> Identity:
-    """Return who answers. Raises DeviceFault when the answer is none."""
+    """Return the identity in an answer. Raises DeviceFault when the answer is invalid."""
     data = _data(answer, 0x08, 38)
     return Identity(int.from_bytes(data[9:13], "little"), f"{data[4]}.{data[3]:02d}", bool(data[31] & 0x08))
 
 
 def parse_constants(positive: bytes, negative: bytes) -> Constants:
-    """Return the constants in the answers for blocks 0 and 2. Raises DeviceFault when there are none to trust."""
+    """Return the constants in the answers for blocks 0 and 2. Raises DeviceFault when they are implausible."""
     slope, _, _, _ = _fixed_points(_data(positive, 0x2D, 40)[2:])
     negative_slope, centre, _, _ = _fixed_points(_data(negative, 0x2D, 40)[2:])
     # Within 5 % of the nominal values of the User's Guide: an unwritten memory gives zeros or ones.
@@ -161,19 +161,19 @@ def meaning(code: int) -> str:
 class StreamDecoder:
     """Cuts a stream's bytes into scans. `damaged` counts scans lost before each; never raises.
 
-    The packet counter has 8 bits: 256 packets lost together look like none, which the numbering finds by the clock.
+    The packet counter has 8 bits: a loss of 256 packets is invisible here and found by the numbering's clock.
     """
 
     def __init__(self, constants: Constants) -> None:
-        self.malformed = 0  # scans in packets that came broken
+        self.malformed = 0  # scans in broken packets
         self._constants = constants
         self._bytes = bytearray()
-        self._skipped = 0  # bytes of something that is no packet
+        self._skipped = 0  # bytes outside packets
         self._next = 0  # packet counter expected
-        self._lost = 0  # scans lost since the last one handed on
+        self._lost = 0  # scans lost since the last one returned
 
     def feed(self, data: bytes) -> Records:
-        """Take what arrived and return every scan it completes: volts (n, 6), status (n,), scans lost before (n,)."""
+        """Take bytes and return every scan they complete: volts (n, 6), status (n,), scans lost before (n,)."""
         self._bytes += data
         scans: list[NDArray[np.uint16]] = []
         errors: list[int] = []
@@ -197,7 +197,7 @@ class StreamDecoder:
         return Records(volts, status, np.array(damaged, np.int64))
 
     def _packets(self) -> list[bytes]:
-        """Take whole sound packets off the front; bytes that begin none are skipped."""
+        """Take whole sound packets off the front; other bytes are skipped."""
         packets: list[bytes] = []
         prefix = bytes([0xF9, 4 + _GAUGES * SCANS, 0xC0])
         while True:
@@ -214,14 +214,14 @@ class StreamDecoder:
             del self._bytes[:STREAM_PACKET]
 
     def _skip(self, count: int) -> None:
-        """Drop bytes that are no packet; every packet's length of them, begun, counts as one packet's scans."""
+        """Drop bytes outside packets; each begun packet length of them counts as one packet's scans."""
         previous, self._skipped = self._skipped, self._skipped + count
         self.malformed += SCANS * (-(-self._skipped // STREAM_PACKET) - -(-previous // STREAM_PACKET))
         del self._bytes[:count]
 
 
 def _data(answer: bytes, command: int, length: int) -> bytes:
-    """Return the data of an extended answer from its error code on. Raises DeviceFault when it is none or refuses."""
+    """Return the data of an extended answer from its error code on. Raises DeviceFault if it is invalid or refuses."""
     if answer[:2] == b"\xb8\xb8":
         raise DeviceFault("the converter found a request garbled; check the USB cable")
     if len(answer) != length or answer[3] != command or not _is_sound(answer):
@@ -242,7 +242,7 @@ def _extended_command(command: int, data: bytes) -> bytes:
 
 
 def _is_sound(packet: bytes) -> bool:
-    """Tell whether both sums of an extended packet are right."""
+    """Say whether both sums of an extended packet are right."""
     return packet[0] == _sum8(packet[1:6]) and packet[4:6] == (sum(packet[6:]) & 0xFFFF).to_bytes(2, "little")
 
 

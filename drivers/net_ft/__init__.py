@@ -1,4 +1,4 @@
-"""Finding out who answers at a net-ft address, and setting what the address asks for: web pages and command port."""
+"""Identification and setup of the box at a net-ft address, by its web pages and command port."""
 
 import math
 import time
@@ -16,8 +16,8 @@ from drivers.net_ft.device import NetFtTransducer
 from drivers.net_ft.wire import COUNTER_RATE
 from drivers.transducer import LinkLost, SetupError, TransducerInfo
 
-_AT_ONCE = 0.18  # for one web page while a stream is silent, and so for a stop [real s]
-_SETTLING = 0.05  # after a bias was asked for [real s]
+_AT_ONCE = 0.18  # for one web page while a stream is silent, and so the longest delay of a stop [real s]
+_SETTLING = 0.05  # after a bias request [real s]
 _OPTIONS = frozenset({"rdt", "tcp", "http", "rate", "mode", "bias", "latch"})
 
 
@@ -28,14 +28,14 @@ class _Target:
     rdt_port: int
     tcp_port: int
     rate: int | None  # requested in the address [Hz]; None leaves the box as it is
-    buffered: bool  # several records a datagram: fewer datagrams, later
-    set_bias: bool  # the load at opening reads as zero from then on
+    buffered: bool  # several records in a datagram: fewer datagrams, more delay
+    set_bias: bool  # the load at opening becomes zero
     reset_latch: bool  # of the monitor condition
     host: str  # its IPv4 address
 
 
 def open_net_ft(address: Address, clock: Clock, deadline: Deadline) -> NetFtTransducer:
-    """Return the box at `address`, set as it asks, not streaming. Raises SetupError or LinkLost with the reason."""
+    """Return the box at `address`, set up by it, not streaming. Raises SetupError or LinkLost with the reason."""
     target = _target_of(address, deadline)
     return NetFtTransducer(
         _prepare(target, deadline),
@@ -48,7 +48,7 @@ def open_net_ft(address: Address, clock: Clock, deadline: Deadline) -> NetFtTran
 
 
 def identify_net_ft(address: Address, deadline: Deadline) -> TransducerInfo:
-    """Return who answers, changing nothing. Raises SetupError or LinkLost with the reason."""
+    """Return the box's info, changing nothing. Raises SetupError or LinkLost with the reason."""
     return _configuration(_target_of(address, deadline), deadline).info
 
 
@@ -68,7 +68,7 @@ def _target_of(address: Address, deadline: Deadline) -> _Target:
 
 
 def _prepare(target: _Target, deadline: Deadline) -> TransducerInfo:
-    """Set the box as the address asks, and return its description, read back afterwards."""
+    """Set up the box by the address, and return its description, read back afterwards."""
     configuration = _configuration(target, deadline)
     if not configuration.streams:
         uri = target.address.uri
@@ -91,7 +91,7 @@ def _prepare(target: _Target, deadline: Deadline) -> TransducerInfo:
 
 
 def _command(target: _Target, configuration: Configuration, deadline: Deadline) -> dict[str, str]:
-    """Send the commands that the address asks for, and return the results for the record."""
+    """Send the commands in the address, and return their results for the record."""
     units = wire.parse_units(_tcp(target, wire.READ_UNITS, 24, deadline))
     if units is None or (units.counts_per_force, units.counts_per_torque) != configuration.counts:
         raise SetupError(
@@ -126,7 +126,7 @@ def _tcp(target: _Target, command: bytes, size: int, deadline: Deadline) -> byte
 
 
 def _identify(target: _Target) -> TransducerInfo | None:
-    """Return who answers at once, None when nobody does. Raises SetupError when its page makes no sense."""
+    """Return the box's info if it answers quickly, else None. Raises SetupError when its page is invalid."""
     try:
         return _configuration(target, Deadline(_AT_ONCE)).info
     except LinkLost:

@@ -18,7 +18,7 @@ _FILTERS = {"0": "off"} | {str(code): f"{cut_off} Hz" for code, cut_off in enume
 
 
 class Configuration(NamedTuple):
-    """What the box says of itself and of the configuration in force."""
+    """The box's info and active configuration."""
 
     info: TransducerInfo
     counts: tuple[float, float]  # in one force unit, and in one torque unit
@@ -26,14 +26,14 @@ class Configuration(NamedTuple):
 
 
 def parse_configuration(page: bytes, uri: str) -> Configuration:
-    """Return what netftapi2.xml says of the box at `uri`. Raises SetupError where it lacks or contradicts something."""
+    """Parse netftapi2.xml of the box at `uri`. Raises SetupError where it is incomplete or contradictory."""
     elements = _elements(page)
     product = _required(elements, "prodname")
     status = AXIA if "axia" in product.lower() else NET_FT
     ticks = _ticks(_optional(elements, "setadcrate")) if status is AXIA else COUNTER_RATE
     settings = {
         "configuration": _optional(elements, "cfgnam"),
-        "filter": _FILTERS.get(code := _optional(elements, "setuserfilter"), code),  # itself where it is unknown
+        "filter": _FILTERS.get(code := _optional(elements, "setuserfilter"), code),  # an unknown code as it is
         "stored bias [gauge counts]": " ".join(re.split(r"[;,\s]+", _optional(elements, "setbias"))),
         "tool transform": _transform(elements),
         "status at opening": _status(_optional(elements, "runstat"), status),
@@ -47,12 +47,12 @@ def parse_configuration(page: bytes, uri: str) -> Configuration:
     counts = _positive("cfgcpf", _required(elements, "cfgcpf")), _positive("cfgcpt", _required(elements, "cfgcpt"))
     force, torque = _required(elements, "scfgfu"), _required(elements, "scfgtu")
     units = np.repeat([_unit("force", force, FORCE), _unit("torque", torque, TORQUE)], 3)
-    serial = _optional(elements, "cfgcalsn")  # of the calibration in force; empty where the box states none
+    serial = _optional(elements, "cfgcalsn")  # of the active calibration; empty where the box states none
     matrix, rated = np.diag(units / np.repeat(counts, 3)), _ratings(elements) * units
     info = TransducerInfo(
         uri=uri,
         driver="net-ft",
-        # The model is that of the transducer as the box states it, which is not always right.
+        # The transducer's model as stated by the box, which is not always right.
         model=" ".join(filter(None, (product, _optional(elements, "mfgtxdmdl")))),
         serial=serial,
         simulated="SIMULATED" in product.upper(),
@@ -66,10 +66,10 @@ def parse_configuration(page: bytes, uri: str) -> Configuration:
 
 
 def true_rate(nominal: float, ticks: float = COUNTER_RATE) -> float:
-    """Return the rate the box really streams at when it is set to, or shows, `nominal` [Hz].
+    """Return the true rate of the box when it is set to, or shows, `nominal` [Hz].
 
-    It can only send every k-th of its own readings, `ticks` a second, rounds up to such a rate, and shows it as a whole
-    number.
+    The box can only send every k-th of its own readings, `ticks` a second. It rounds up to such a rate, and shows it as
+    an integer.
 
     >>> true_rate(200), round(true_rate(150), 2), round(true_rate(152), 2)
     (200.0, 152.17, 152.17)
@@ -78,7 +78,7 @@ def true_rate(nominal: float, ticks: float = COUNTER_RATE) -> float:
 
 
 def _elements(page: bytes) -> dict[str, list[str]]:
-    """Return the texts of all elements that hold text alone, by name."""
+    """Return the texts of all elements without children, by name."""
     try:
         root = parse_xml(page)
     except ValueError as error:
@@ -102,7 +102,7 @@ def _required(elements: Mapping[str, list[str]], name: str) -> str:
 
 
 def _optional(elements: Mapping[str, list[str]], name: str) -> str:
-    """Return the text of an element, or nothing where it is missing or contradicts itself."""
+    """Return the text of an element, or "" where it is missing or repeated."""
     texts = elements.get(name, [])
     return texts[0] if len(texts) == 1 else ""
 
@@ -126,7 +126,7 @@ def _unit(dimension: str, text: str, units: Mapping[str, float]) -> float:
 
 
 def _ratings(elements: Mapping[str, list[str]]) -> Array:
-    """Return six ranges in the box's units, nan where it states none."""
+    """Return six rated ranges in the box's units, nan where it states none."""
     values = np.array([number(piece) for piece in re.split(r"[;,\s]+", _optional(elements, "cfgmr")) if piece])
     return values if len(values) == 6 and np.all(np.isfinite(values) & (values > 0.0)) else np.full(6, np.nan)
 
@@ -137,7 +137,7 @@ def _rate(text: str, ticks: float) -> float:
 
 
 def _ticks(text: str) -> float:
-    """Return the rate of an Axia's converter [Hz], which it states as a whole number. Raises SetupError for another."""
+    """Return the rate of an Axia's converter [Hz], stated as an integer. Raises SetupError for unknown rates."""
     rates = {"488": 488.28125, "976": 976.5625, "1953": 1953.125, "3906": 3906.25, "7812": 7812.5}
     if text not in rates:
         raise SetupError(f"the box says its converter runs at {text[:20]!r} Hz, not at one of {', '.join(rates)}")
@@ -145,7 +145,7 @@ def _ticks(text: str) -> float:
 
 
 def _transform(elements: Mapping[str, list[str]]) -> str:
-    """Return the tool transform in force with its units, or nothing where there is none."""
+    """Return the active tool transform with its units, "" without one."""
     values = [piece for piece in re.split(r"[;,\s]+", _optional(elements, "cfgtfx")) if piece]
     if not any(number(value) != 0.0 for value in values):
         return ""

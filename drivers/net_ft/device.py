@@ -1,4 +1,4 @@
-"""The networked force/torque box as a transducer: streaming, accounting, loss and return."""
+"""The networked force/torque box as a transducer: streaming, accounting, loss and reconnection."""
 
 import contextlib
 import threading
@@ -18,25 +18,25 @@ from drivers.sequence import SequenceAccount
 from drivers.threaded import ThreadedTransducer
 from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, TransducerInfo
 
-_EVERY = 0.5  # between two looks, so that a change is found within 1 s [real s]
-_AGAIN = 0.05  # after a look that nobody answered
-_ENDING = 0.3  # for a look under way when the watch ends; the look itself takes no longer
-_TRANSFORM = "tool transform"  # name of the setting that turns and shifts what the box measures
+_EVERY = 0.5  # between two checks, so that a change is detected within 1 s [real s]
+_AGAIN = 0.05  # after a check without an answer
+_ENDING = 0.3  # for a check in progress when the watch ends; no check takes longer
+_TRANSFORM = "tool transform"  # name of the setting that rotates and shifts the box's wrench
 
 
 class _SettingsWatch:
-    """Compares the page with what was read at opening, on a thread of its own."""
+    """Compares the page with its content at opening, in a separate thread."""
 
     def __init__(self, info: TransducerInfo, identify: Callable[[], TransducerInfo | None], clock: Clock) -> None:
-        """Watch the box of `info`. `identify` returns who answers there now, soon, None when nobody does."""
-        self.fault: Exception | None = None  # what was found, or an error of ours
-        self.confirmed_ns = clock.now_ns()  # until then the box counted as before [ns, session clock]
+        """Watch the box of `info`. `identify` quickly returns the info of the box that answers now, or None."""
+        self.fault: Exception | None = None  # a changed setting, or an internal error
+        self.confirmed_ns = clock.now_ns()  # until then the units are confirmed [ns, session clock]
         self._info = info
         self._identify = identify
         self._clock = clock
-        self.look = threading.Event()  # set: look at once, for the stream shows that something was changed
+        self.look = threading.Event()  # set: check immediately, since the stream shows a change
         self._stop = threading.Event()
-        self._senseless = 0  # pages in a row that make no sense
+        self._senseless = 0  # invalid pages in a row
         self._thread = threading.Thread(target=self._run, name=f"settings of {info.serial}", daemon=True)
 
     def start(self) -> None:
@@ -48,14 +48,14 @@ class _SettingsWatch:
         self._thread.join(_ENDING)
 
     def is_the_same(self) -> bool:
-        """Tell whether the box answers and counts as before. Raises DeviceFault when another does, or other units."""
+        """Say whether the box answers with the same settings. Raises DeviceFault for another box or other settings."""
         began_ns = self._clock.now_ns()
         try:
             info = self._identify()
             self._senseless = 0
         except SetupError as error:
             self._senseless += 1
-            if self._senseless > 1:  # once it may have been cut on its way
+            if self._senseless > 1:  # a single page may have been truncated on its way
                 raise DeviceFault(f"{error}; it did when it was opened") from None
             return False
         if info is None:
@@ -80,7 +80,7 @@ class _SettingsWatch:
             self.look.clear()
             try:
                 is_same = self.is_the_same()
-            except Exception as fault:  # noqa: BLE001 - units that are watched no more must not look confirmed
+            except Exception as fault:  # noqa: BLE001 - units that are no longer watched must not look confirmed
                 self.fault = fault
                 return
             self.look.wait(_EVERY if is_same else _AGAIN)
@@ -91,22 +91,22 @@ def _units(info: TransducerInfo) -> str:
     return f"{force:.6g} counts a N and {torque:.6g} a N mm"
 
 
-# All in real seconds, since networks know no other.
-_TICK = 0.05  # longest wait for a datagram, and so for a stop
-_ASK_EVERY = 0.1  # between two start requests while nothing comes
-_SILENCE = 3.0  # until a box that has fallen silent is given up
+# All in real seconds, the time of networks.
+_TICK = 0.05  # longest wait for a datagram, and so the longest delay of a stop
+_ASK_EVERY = 0.1  # between two start requests while nothing arrives
+_SILENCE = 3.0  # until a silent box is given up
 _QUIET = 0.3  # silence after which the box is asked to start again
-_THEFTS = 3  # returns within _THEFT_SPAN from which another client keeps taking the stream
+_THEFTS = 3  # restarts within _THEFT_SPAN from which another client is assumed to take the stream
 _THEFT_SPAN = 3.0
-_SILENT_TICKS = 2.0  # across a longer silence the box's counter is not compared with the computer's clock
-_TOGETHER = 50_000_000  # one record in this time is compared [ns]
+_SILENT_TICKS = 2.0  # a longer silence suspends the comparison of the box's counter with the computer's clock
+_TOGETHER = 50_000_000  # interval of compared records [ns]
 
 
 class NetFtTransducer(ThreadedTransducer):
-    """One box, through a link that is opened at each start. A thread drains the link; readings are decoded when read.
+    """One box, through a link that is opened at each start. A thread empties the link; readings are decoded on reading.
 
     Time is (counter - first counter) / counter rate, by the box's own oscillator (good to 0.5 %). After a reboot of the
-    box, sequence and time go on behind a gap whose length is taken from the session's clock.
+    box, sequence and time continue after a gap measured by the session's clock.
     """
 
     def __init__(
@@ -119,21 +119,21 @@ class NetFtTransducer(ThreadedTransducer):
         *,
         opening: Deadline | None = None,
     ) -> None:
-        """Take an identified box, opened by `opening`. `request` asks for the stream.
+        """Take an identified box, opened within `opening`. `request` starts the stream.
 
-        `identify` returns who answers there now, soon, None when nobody does; it is asked again and again.
+        `identify` quickly returns the info of the box that answers now, or None; it is called repeatedly.
         """
         super().__init__(info, clock, opening)
         self._request = request
         self._connect = connect
         self._identify = identify
-        self._step = round(info.counter_rate / info.rate) if info.rate > 0.0 else None  # nan: learn it
+        self._step = round(info.counter_rate / info.rate) if info.rate > 0.0 else None  # nan: learned from the stream
         self._period = 1.0 / info.rate / clock.factor if info.rate > 0.0 else 0.0  # between two readings [real s]
         self.reset()
 
     @property
     def health(self) -> Health:
-        """Totals since start, of all that has arrived up to now."""
+        """Totals since start, of everything that has arrived."""
         with self.lock:
             self.digest()
             account = self._account
@@ -157,7 +157,7 @@ class NetFtTransducer(ThreadedTransducer):
         return self.health.received > 0
 
     def check_first(self) -> None:
-        """Raise why the stream cannot be used, where it cannot; DeviceFault when its rate is wrong."""
+        """Raise an error if the stream is unusable; DeviceFault when its rate is wrong."""
         super().check_first()
         if self._step is not None and self._account.step not in (None, self._step):
             raise DeviceFault(
@@ -170,15 +170,15 @@ class NetFtTransducer(ThreadedTransducer):
         self._pending: deque[tuple[bytes, int]] = deque()  # datagrams with their arrival [ns], from the thread
         self._account = SequenceAccount(self._step, self.info.counter_rate)
         self._watch = RateWatch(self.info.counter_rate, self.clock.factor, _SILENT_TICKS * self.clock.factor)
-        self._breaks = self._changes = 0  # in the device's counter, and of it or the rate, so far
+        self._breaks = self._changes = 0  # breaks of the device's counter, and changes of it or of the rate, so far
         self._held_back: list[tuple[bytes, int]] = []
         self._zero: int | None = None  # counter of the first reading
         self._wrong_length = 0
         self._settings = _SettingsWatch(self.info, self._identify, self.clock)
-        self._unconfirmed: deque[tuple[int, int]] = deque()  # when the last of so many readings came, units unsure [ns]
+        self._unconfirmed: deque[tuple[int, int]] = deque()  # last arrival [ns] and number of unconfirmed ones
 
     def run(self) -> None:
-        """Ask for the stream, take what comes, ask again when it falls silent, and end it."""
+        """Start the stream, take datagrams, restart it when it falls silent, and end it."""
         link = self._connect(self.begin_by)
         try:
             self._settings.start()
@@ -188,19 +188,19 @@ class NetFtTransducer(ThreadedTransducer):
             self._settings.end()
 
     def _take_leave(self, link: Link) -> None:
-        """Bring the stream to an end, and take what had been sent."""
+        """End the stream, and take the datagrams already sent."""
         with contextlib.suppress(LinkLost):
             link.send(STOP)
-            link.send(STOP)  # it is not acknowledged and may be lost; a second one does no harm
+            link.send(STOP)  # a stop is not acknowledged and may be lost; a second one is harmless
             while (datagram := link.receive(0.0)) is not None:
                 self._pending.append((datagram, self.clock.now_ns()))
         link.close()
 
     def _listen(self, link: Link) -> None:
-        """Take datagrams until asked to stop, or until the box has been silent for too long."""
+        """Take datagrams until a stop, or until the box has been silent for too long."""
         receive, keep, now_ns = link.receive, self._pending.append, self.clock.now_ns
         link.send(self._request)
-        # Silence is counted in waits that brought nothing, so that a computer too busy to look is not taken for it.
+        # Silence is counted in waits without data, so that a busy computer is not mistaken for silence.
         silence = last_request = 0.0
         streaming = ever = False
         returns: deque[float] = deque(maxlen=_THEFTS)
@@ -265,9 +265,9 @@ class NetFtTransducer(ThreadedTransducer):
         )
 
     def _compare_clocks(self, counter: Indices, received_ns: Indices) -> None:
-        """Hold the box's counter against the session's clock."""
+        """Compare the box's counter with the session's clock."""
         breaks = self._account.restarted + self._account.frozen
-        if breaks != self._breaks:  # it stood still, or restarted
+        if breaks != self._breaks:  # it was frozen, or restarted
             self._breaks = breaks
             self._watch.begin_anew()
             return
@@ -276,7 +276,7 @@ class NetFtTransducer(ThreadedTransducer):
             self._watch.take(int(counter[i]), int(received_ns[i]))
 
     def _compare_settings(self, received_ns: int, count: int) -> None:
-        """Keep count of readings whose units are not confirmed, and look at once where rate or counter has changed."""
+        """Count readings with unconfirmed units, and request a check where rate or counter has changed."""
         changes = self._account.changed + self._account.restarted + self._watch.changes
         if changes != self._changes:
             self._changes = changes

@@ -17,11 +17,11 @@ _REQUEST = struct.Struct(">HHI")  # header, command, number of records (0: until
 _HEADER = 0x1234
 
 STOP = _REQUEST.pack(_HEADER, 0x0000, 0)
-START = _REQUEST.pack(_HEADER, 0x0002, 0)  # one record a datagram, until stopped
-START_BUFFERED = _REQUEST.pack(_HEADER, 0x0003, 0)  # as many records a datagram as the box is set to
+START = _REQUEST.pack(_HEADER, 0x0002, 0)  # one record in a datagram, until stopped
+START_BUFFERED = _REQUEST.pack(_HEADER, 0x0003, 0)  # as many records in a datagram as set in the box
 
 READ_WRENCH = bytes(20)  # commands of the TCP port
-SET_BIAS = bytes(19) + b"\x01"  # the present load reads as zero from then on
+SET_BIAS = bytes(19) + b"\x01"  # the present load becomes zero
 RESET_LATCH = bytes(19) + b"\x02"  # of the monitor condition
 READ_UNITS = b"\x01" + bytes(19)
 _WRENCH = struct.Struct(">HH6h")
@@ -37,10 +37,10 @@ RECORD = np.dtype(
 )
 COUNTER_RATE = 7000.0  # ticks a second, good to 0.5 % [Hz]
 
-_SUMMARY = 1 << 31  # some bit is an error
+_SUMMARY = 1 << 31  # set with any error bit
 
-# A monitor condition is latched where a threshold that the user set was crossed. Whether the summary bit comes with it
-# is not agreed on: both forms are a note. All else is doubtful, as in the most careful published client.
+# A monitor condition is latched when a threshold set by the user is crossed. Sources disagree whether the summary bit
+# accompanies it: both forms are a note. Everything else is doubtful, as in the most careful published client.
 _NET_FT = (
     bit(30, "processor or memory fault", "doubtful"),
     bit(29, "digital board fault", "doubtful"),
@@ -87,20 +87,20 @@ _AXIA = (
 )
 
 
-NET_FT, AXIA = StatusTable(_NET_FT, _SUMMARY), StatusTable(_AXIA, _SUMMARY)  # the boxes that speak this wire
+NET_FT, AXIA = StatusTable(_NET_FT, _SUMMARY), StatusTable(_AXIA, _SUMMARY)  # the boxes with this protocol
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DecodedBatch:
-    """A batch of datagrams decoded: n records, and how many datagrams held none."""
+    """A decoded batch of datagrams: n records, and the number of malformed datagrams."""
 
     records: NDArray[np.void]  # (n,) of RECORD
-    origin: NDArray[np.intp]  # (n,) the datagram each came in
-    malformed: int  # datagrams of a length that no record has
+    origin: NDArray[np.intp]  # (n,) datagram of each record
+    malformed: int  # datagrams of a wrong length
 
 
 def decode(datagrams: Sequence[bytes]) -> DecodedBatch:
-    """Return the records of `datagrams`, one or several whole ones in each. Raises nothing."""
+    """Return the records of `datagrams`, one or more whole records in each. Raises nothing."""
     size = RECORD.itemsize
     counts = [0 if len(datagram) % size else len(datagram) // size for datagram in datagrams]
     records = np.frombuffer(b"".join(itertools.compress(datagrams, counts)), RECORD)
@@ -108,14 +108,14 @@ def decode(datagrams: Sequence[bytes]) -> DecodedBatch:
 
 
 def parse_wrench(answer: bytes) -> tuple[int, ...] | None:
-    """Return the six 16-bit counts that answer READ_WRENCH, SET_BIAS or RESET_LATCH; None where it is no answer."""
+    """Return the six 16-bit counts in an answer to READ_WRENCH, SET_BIAS or RESET_LATCH; None if it is invalid."""
     if len(answer) != _WRENCH.size or answer[:2] != _HEADER.to_bytes(2, "big"):
         return None
     return _WRENCH.unpack(answer)[2:]
 
 
 def is_latched(answer: bytes) -> bool:
-    """Tell whether the status that comes with such an answer, its upper half, says that a condition is latched.
+    """Say whether the status in such an answer, an upper half, shows a latched condition.
 
     >>> is_latched(bytes.fromhex("1234 8001" + "0000" * 6)), is_latched(bytes.fromhex("1234 0000" + "0000" * 6))
     (True, False)
@@ -125,15 +125,15 @@ def is_latched(answer: bytes) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """How the TCP port counts."""
+    """Units of the TCP port."""
 
     counts_per_force: int
     counts_per_torque: int
-    scales: tuple[int, ...]  # full counts in one of the six 16-bit counts
+    scales: tuple[int, ...]  # full counts in one 16-bit count of each axis
 
 
 def parse_units(answer: bytes) -> Units | None:
-    """Return what answers READ_UNITS, None where it is no answer.
+    """Return the units in an answer to READ_UNITS, None if it is invalid.
 
     >>> parse_units(bytes.fromhex("1234 02 03 000F4240 000F4240 05DC 05DC 05DC 000A 000A 000A"))
     Units(counts_per_force=1000000, counts_per_torque=1000000, scales=(1500, 1500, 1500, 10, 10, 10))

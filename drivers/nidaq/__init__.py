@@ -1,7 +1,7 @@
-"""Six gauges on a data-acquisition device of National Instruments, through its maker's library.
+"""Six gauges on a data-acquisition device of National Instruments, by its maker's library.
 
-The library (`nidaqmx`, an optional extra) brings its own codec: volts come as numbers. It times the readings by the
-device's clock and numbers nothing; when its buffer overflows it ends the acquisition, which restarts behind a gap.
+The library (`nidaqmx`, an optional extra) has its own codec: volts arrive as numbers. It times readings by the device's
+clock without numbering them. When its buffer overflows it ends the acquisition, which restarts after a gap.
 """
 
 import importlib
@@ -23,20 +23,20 @@ from drivers.transducer import LinkLost, SetupError, StatusTable, TransducerInfo
 
 _GAUGES = 6
 RANGE = 10.0  # [V]
-_LIMIT = 9.9  # of a gauge's voltage [V]; a converter of 16 bits clips slightly outside of 10 V
+_LIMIT = 9.9  # of a gauge's voltage [V]; a 16-bit converter clips slightly above 10 V
 # Bit 8 + i of a status says that gauge i is at its limit.
 _STATUS_BITS = StatusTable(
     tuple(bit(8 + gauge, f"gauge {gauge} at its limit", "saturated") for gauge in range(_GAUGES))
 )
-_BUFFER = 10.0  # readings that the library keeps for a computer that is late [s]
-_NAP = 0.005  # between two looks for readings [real s]
+_BUFFER = 10.0  # buffer of the library for a late computer [s]
+_NAP = 0.005  # between two polls for readings [real s]
 _OPTIONS = frozenset({"cal", "rate"})
 _EXAMPLE = "nidaq://Dev1?cal=FILE"
 _DEFAULT_RATE = 1000  # [Hz]
 
 
-def library() -> Any:  # noqa: ANN401 - it is not always there
-    """Return NI's library. Raises SetupError with what to install."""
+def library() -> Any:  # noqa: ANN401 - optional
+    """Return NI's library. Raises SetupError with installation advice."""
     try:
         importlib.import_module("nidaqmx.constants")
         importlib.import_module("nidaqmx.system")
@@ -65,13 +65,13 @@ def open_nidaq(address: Address, clock: Clock, deadline: Deadline) -> StreamingT
 
 
 def identify_nidaq(address: Address, _deadline: Deadline) -> TransducerInfo:
-    """Return who is there; nothing is acquired. Raises SetupError with the reason."""
+    """Return the transducer's info without acquiring data. Raises SetupError with the reason."""
     check_form(address, _EXAMPLE, _OPTIONS)
     return _device_info(library(), address)[1]
 
 
 def _device_info(api: Any, address: Address) -> tuple[str, TransducerInfo]:  # noqa: ANN401
-    """Return the device's name as NI-DAQmx spells it, and who the transducer on it is."""
+    """Return the device's name in NI-DAQmx, and the info of its transducer."""
     file = address.options.get("cal")
     if file is None:
         raise AddressError(f"{address.uri}: write {_EXAMPLE}, with the transducer's own .cal file")
@@ -107,9 +107,9 @@ def _device_info(api: Any, address: Address) -> tuple[str, TransducerInfo]:  # n
 
 
 class _TaskLink:
-    """One acquisition as a link: what is received are volts of whole readings, as bytes of float64."""
+    """One acquisition as a link: it receives volts of whole readings, as bytes of float64."""
 
-    def __init__(self, library: Any, device: str, rate: float) -> None:  # noqa: ANN401 - nidaqmx is not always there
+    def __init__(self, library: Any, device: str, rate: float) -> None:  # noqa: ANN401 - nidaqmx is optional
         """Acquire the six differential pairs from ai0 on, at `rate` [Hz]. Raises SetupError when the device refuses."""
         self._library = library
         self._device = device
@@ -139,7 +139,7 @@ class _TaskLink:
             raise SetupError(f"{device} cannot be set: {_sentence(error)}") from None
 
     def send(self, data: bytes) -> None:
-        """Begin or end the acquisition: b"start" or b"stop". Raises LinkLost when the device is gone."""
+        """Start or stop the acquisition: b"start" or b"stop". Raises LinkLost when the device is gone."""
         try:
             self._task.start() if data == b"start" else self._task.stop()
         except self._library.DaqError as error:
@@ -166,12 +166,12 @@ class _TaskLink:
 
 
 class _VoltsDecoder:
-    """Turns volts into records; nothing is ever broken or numbered."""
+    """Turns volts into records, which are never broken and have no numbers."""
 
     malformed = 0
 
     def feed(self, data: bytes) -> Records:
-        """Take whole readings as bytes of float64 and return them with the status of their gauges."""
+        """Take whole readings as bytes of float64 and return them with their gauges' status."""
         volts = np.frombuffer(data, np.float64).reshape(-1, _GAUGES)
         status = ((np.abs(volts) >= _LIMIT) * (1 << np.arange(8, 8 + _GAUGES))).sum(axis=1)
         return Records(volts, status.astype(np.int64), np.zeros(len(volts), np.int64))

@@ -1,4 +1,4 @@
-"""The stand-alone controller: finding out who answers, how fast it streams, and the exchange around a stream."""
+"""The stand-alone controller: identification, rate, and the exchange around a stream."""
 
 import contextlib
 import math
@@ -19,15 +19,15 @@ from drivers.streaming import StreamingTransducer, measured_rate
 from drivers.transducer import DeviceFault, LinkLost, TransducerInfo
 
 # All in real seconds.
-_SETTLED = 0.05  # of silence behind a prompt that show it is one, and no byte of a record
+_SETTLED = 0.05  # of silence after a prompt that distinguish it from a byte of a record
 _BETWEEN = 0.02  # between two commands
 _ANSWER = 0.6  # for the answer to a command
-_BANNER = 6.0  # for all the controller says when it starts
-_SILENT = 0.02  # behind the prompt after a stream
+_BANNER = 6.0  # for the controller's start-up text
+_SILENT = 0.02  # after the prompt that ends a stream
 _END = 0.08  # for the prompt after a stream
 _TRIES = 3
 _BAUDS = (38400, 9600, 115200, 19200, 57600, 4800)  # tried in this order; published drivers disagree on the usual one
-_MEASURED = 0.6  # for how long the stream is watched to learn its rate [real s]
+_MEASURED = 0.6  # measurement of the stream's rate [real s]
 _OPTIONS = frozenset({"baud", "format", "counts_per_N", "counts_per_Nm", "range_N", "range_Nm", "serial", "simulated"})
 
 
@@ -41,7 +41,7 @@ class _Target:
 
 
 def open_serial_ft(address: Address, clock: Clock, deadline: Deadline) -> StreamingTransducer:
-    """Return the controller at `address`, set, its rate watched. Raises SetupError, LinkLost or DeviceFault."""
+    """Return the controller at `address`, set up, its rate measured. Raises SetupError, LinkLost or DeviceFault."""
     target = _target_of(address)
     conversation = _ControllerConversation(binary=target.binary)
     with prefix_failures(address):
@@ -54,7 +54,7 @@ def open_serial_ft(address: Address, clock: Clock, deadline: Deadline) -> Stream
 
 
 def identify_serial_ft(address: Address, deadline: Deadline) -> TransducerInfo:
-    """Return who answers, changing no setting (a stream nobody reads is ended)."""
+    """Return the controller's info, changing no setting (an earlier stream is ended)."""
     target = _target_of(address)
     with prefix_failures(address):
         link, baud = _find_controller(target, deadline)
@@ -73,7 +73,7 @@ def _find_controller(target: _Target, deadline: Deadline) -> tuple[SerialLink, i
             link = stack.enter_context(contextlib.closing(SerialLink(target.port, baud)))
             try:
                 if has_prompt(deadline.bound(link), tries=2):
-                    stack.pop_all()  # which leaves it open
+                    stack.pop_all()  # leaves the line open
                     return link, baud
             except LinkLost:
                 if deadline.remaining > 0.0:
@@ -139,7 +139,7 @@ class _ControllerConversation:
         return wire.BinaryDecoder() if self.binary else wire.AsciiDecoder()
 
     def begin(self, link: Link) -> bytes:
-        """Set the controller up and let it stream; return what it streamed already. Raises LinkLost, DeviceFault."""
+        """Set up the controller and start the stream; return its first bytes. Raises LinkLost, DeviceFault."""
         if not has_prompt(link):
             raise LinkLost("the controller gives no prompt; check its power, the cable and the baud rate")
         output = wire.BINARY_OUTPUT if self.binary else wire.ASCII_OUTPUT
@@ -158,7 +158,7 @@ class _ControllerConversation:
         return self._start_stream(link)
 
     def end(self, link: Link) -> None:
-        """Let the stream end: any carriage return does it."""
+        """End the stream, by a carriage return."""
         link.send(wire.RETURN)
         deadline = time.monotonic() + _END
         response = b""
@@ -169,7 +169,7 @@ class _ControllerConversation:
             response = data or response
 
     def _start_stream(self, link: Link) -> bytes:
-        """Ask for the stream, and return what follows the echo of the request."""
+        """Start the stream, and return the bytes after the echo of the request."""
         link.send(wire.STREAM + wire.RETURN)
         response = b""
         deadline = time.monotonic() + _ANSWER
@@ -183,12 +183,12 @@ class _ControllerConversation:
 
 
 def has_prompt(link: Link, tries: int = _TRIES, patience: float = 0.2) -> bool:
-    """Tell whether a controller answers with its prompt; a stream it was sending ends by this."""
+    """Say whether a controller answers with its prompt; this ends any stream."""
     return any(_reply(link, wire.RETURN, patience).rstrip().endswith(wire.PROMPT) for _ in range(tries))
 
 
 def banner(link: Link) -> str:
-    """Start the controller afresh and return what it says then, for people.
+    """Restart the controller and return its start-up text, for people.
 
     Raises DeviceFault when no prompt follows: a controller that lost its memory waits for a Y.
     """
@@ -203,9 +203,9 @@ def banner(link: Link) -> str:
 
 
 def _reply(link: Link, request: bytes, patience: float, *, settled: bool = True) -> bytes:
-    """Return what the controller says to `request`, up to a prompt, or within `patience`.
+    """Return the controller's reply to `request`, up to a prompt or for `patience` [s].
 
-    With `settled` only a prompt that nothing follows is one: in a binary record its byte means something else.
+    With `settled` only a prompt followed by silence counts: its byte may occur in a binary record.
     """
     link.receive(_BETWEEN)
     link.send(request)
@@ -213,7 +213,7 @@ def _reply(link: Link, request: bytes, patience: float, *, settled: bool = True)
     deadline = time.monotonic() + patience
     while True:
         expired = time.monotonic() >= deadline
-        data = link.receive(_SETTLED)  # once more where this computer was busy until now
+        data = link.receive(_SETTLED)  # one more time even if this computer was busy until now
         reply += data or b""
         if expired or (reply.rstrip().endswith(wire.PROMPT) and (data is None or not settled)):
             return reply

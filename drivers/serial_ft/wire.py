@@ -1,7 +1,7 @@
 """Records and commands of the stand-alone force/torque controller (manuals 9620-05-CTL and 9610-05-1001).
 
-The manuals themselves were not at hand: layouts are those that four published drivers agree on. What the error
-digits mean beyond 0 (good), and the exact text of the start-up banner, is not verified.
+The manuals themselves were not available: layouts are those that four published drivers agree on. The meaning of error
+digits other than 0 (good), and the exact text of the start-up banner, are not verified.
 """
 
 import re
@@ -18,13 +18,13 @@ ASCII_OUTPUT = b"CD A"
 BINARY_OUTPUT = b"CD B"
 ONE_RECORD = b"QR"
 STREAM = b"QS"  # until any CR
-SETTINGS = (  # beside the output format
+SETTINGS = (  # besides the output format
     b"CD R",  # resolved forces and torques
     b"CD U",  # no checksum: its algorithm is not verified
     b"CV 3F",  # all six axes
     b"SA 0",  # no moving average
     b"SM 1",  # sensor errors are monitored
-    b"SZ",  # every bias dropped: raw stays raw
+    b"SZ",  # all biases removed: raw values stay raw
 )
 PROMPT = b">"
 RETURN = b"\r"
@@ -35,26 +35,26 @@ BINARY_SIZE = 13  # error byte, six integers Fx Fy Fz Tx Ty Tz
 _BINARY = np.dtype([("error", "u1"), ("values", ">i2", 6)])
 _WIDTH = 6  # characters of an integer in text
 _ASCII_RECORD = re.compile(rb"([0-9])" + rb",( *-?[0-9]+)" * 6)
-_MOST_ERROR = 9  # of an error byte: it stands for one digit
+_MOST_ERROR = 9  # of an error byte, which is a digit
 STATUS_BITS = StatusTable(
     tuple(StatusBit(0xFF, n, f"error digit {n}: saturated or sensor error", "saturated") for n in range(1, 10))
 )
 _ACKNOWLEDGED = b"\x06\r\n>"  # after the record of an answer to QR in binary
-_NEAR = 4  # records that are looked at together where all is steady
-_STEADY = 160  # summed change of their values below which no further proof is asked [counts]
-_WINDOW = 9 * BINARY_SIZE - 1  # bytes that are looked at otherwise: eight records in any place
-_DOUBT = 8  # records behind a break that must prove themselves
-_AWAY = 450  # summed change of values that is too much for a record near a break [counts]
-_BREAK = 6.0  # what a break between records must gain at the least, see _best_shift
+_NEAR = 4  # records judged together while values are steady
+_STEADY = 160  # summed change of their values below which they are accepted [counts]
+_WINDOW = 9 * BINARY_SIZE - 1  # bytes judged together otherwise: eight records at any offset
+_DOUBT = 8  # records after a break that need confirmation
+_AWAY = 450  # largest summed change of values for a record near a break [counts]
+_BREAK = 6.0  # least gain of a break between records, see _best_shift
 
 
 class AsciiDecoder:
-    """Records as lines of text. A line of any other form is a broken record."""
+    """Records as lines of text. A line of another form is a broken record."""
 
     def __init__(self) -> None:
         self.malformed = 0
         self._buffer = bytearray()
-        self._damaged = 0  # records broken since the last good one
+        self._damaged = 0  # broken records since the last good one
 
     def feed(self, data: bytes) -> Records:
         self._buffer += data
@@ -78,33 +78,32 @@ class AsciiDecoder:
         return Records.of(raw, status, damaged)
 
     def _spoil(self, size: int) -> None:
-        """Count `size` bytes that are no record as the records they were at the least."""
+        """Count `size` bytes outside records as the least number of broken records."""
         count = -(-size // ASCII_SIZE)
         self.malformed += count
         self._damaged += count
 
 
 class BinaryDecoder:
-    """Records as bytes without any mark or checksum, so that their place must be kept with care.
+    """Decodes records without delimiters or checksum, whose position must be tracked with care.
 
-    Among all ways to cut the bytes into records, with few breaks, the one is believed whose error bytes are digits
-    and whose values go on best from the last reading. Where that breaks, bytes were lost: they and the records next
-    to them are broken. This is not proof: of records torn at random, 5 in 100 left a wrong reading behind in a trial
-    at rest, and changed bytes, or a loss of exactly as many bytes as a record has, cannot be seen at all. The format
-    has no means; on a line that loses bytes, text output is the safer one.
+    Of all divisions of the bytes into records, with few breaks, the one is chosen whose error bytes are digits and
+    whose values best continue the last reading. A break means lost bytes: these and the adjacent records count as
+    broken. This is no proof: in a trial at rest, 5 of 100 randomly torn records left a wrong reading, and changed
+    bytes, or a loss of exactly one record's bytes, are invisible. On a line that loses bytes, text output is safer.
     """
 
     def __init__(self) -> None:
-        """Expect the first record to begin with the first byte."""
+        """Expect the first record at the first byte."""
         self.malformed = 0
         self._buffer = bytearray()
-        self._position = 0  # where the next record is expected in it
-        self._doubt = 0  # next records that, close behind a break, count only once later ones agree
-        self._skipped = 0  # bytes since the last good record that belong to none
+        self._position = 0  # expected position of the next record in it
+        self._doubt = 0  # next records after a break that count only if later ones agree
+        self._skipped = 0  # bytes outside records since the last good one
         self._last: Indices | None = None  # values of the last good record
 
     def feed(self, data: bytes) -> Records:
-        """Take what arrived and return every record that can be judged: one that three to eight more follow."""
+        """Take bytes and return every record that can be judged, with three to eight more after it."""
         self._buffer += data
         records: list[tuple[int, ...]] = []
         status: list[int] = []
@@ -135,7 +134,7 @@ class BinaryDecoder:
         return Records.of(records, status, damaged)
 
     def _shift(self) -> int | None:
-        """Return how many bytes at the head belong to no record; None while more bytes must come to tell."""
+        """Return the number of bytes before the next record; None while more bytes are needed."""
         window = bytes(self._buffer[self._position : self._position + _WINDOW])
         if len(window) < _NEAR * BINARY_SIZE:
             return None
@@ -146,12 +145,12 @@ class BinaryDecoder:
         return _best_shift(self._gains(window)) if len(window) == _WINDOW else None
 
     def _is_doubtful(self, values: Indices) -> bool:
-        """Tell whether a record behind a break may be pieced together from two: the first, and what is too far off."""
+        """Say whether a record after a break may be spliced from two: the first one, and any with distant values."""
         away = 0 if self._last is None else int(np.abs(values - self._last).sum())
         return self._doubt == _DOUBT or (self._doubt > 0 and away > _AWAY)
 
     def _gains(self, window: bytes) -> list[float]:
-        """Return how well a record at each byte of `window` goes on from the last good one; -inf where none is."""
+        """Return the gain of a record at each byte of `window` after the last good one; -inf where none is possible."""
         bytes_ = np.lib.stride_tricks.sliding_window_view(np.frombuffer(window, np.uint8), BINARY_SIZE)
         values = bytes_[:, 1::2].astype(np.int8) * np.int64(256) + bytes_[:, 2::2]
         away = np.abs(values - (values if self._last is None else self._last)).sum(axis=1)
@@ -159,20 +158,20 @@ class BinaryDecoder:
 
 
 def _gain(away: ArrayLike) -> Array:
-    """Return what a record is worth that lies so far from the last good one [counts]: 3 at the very least."""
+    """Return the gain of a record at a distance from the last good one [counts]: at least 3."""
     return 16.0 - np.log2(1.0 + np.asarray(away, np.float64) / 64.0)
 
 
 def _best_shift(gains: list[float]) -> int:
-    """Return how many bytes to skip for the greatest sum of `gains` over records that follow each other.
+    """Return the number of bytes to skip for the greatest sum of `gains` over consecutive records.
 
-    Whenever bytes are skipped between records, _BREAK is taken off. A record always gains more than nothing, so that
-    one in its place is never thrown away for being unlike the others. But shortly before a break it is, and the last
-    one before it in any case: its own end may be among the bytes that were lost.
+    Each skip between records costs _BREAK. A record always has a positive gain, so one in its place is never dropped
+    for being unlike the others, except shortly before a break. The last one before a break is always dropped: its own
+    end may be among the lost bytes.
     """
     size = len(gains)
-    value = [0.0] * (size + BINARY_SIZE)  # the best that can be made of all from a byte on
-    skip_value = [0.0] * (size + 1)  # the same, with that byte skipped
+    value = [0.0] * (size + BINARY_SIZE)  # greatest sum from a byte on
+    skip_value = [0.0] * (size + 1)  # the same with that byte skipped
     for i in range(size - 1, -1, -1):
         skip_value[i] = max(skip_value[i + 1], gains[i + 1] + value[i + 1 + BINARY_SIZE] if i + 1 < size else 0.0)
         value[i] = max(gains[i] + value[i + BINARY_SIZE], skip_value[i] - _BREAK)
@@ -191,7 +190,7 @@ def _best_shift(gains: list[float]) -> int:
 
 
 def answered_record(answer: bytes, *, binary: bool) -> bool:
-    """Tell whether `answer` to QR holds one whole record of the expected form and ends with the prompt."""
+    """Say whether `answer` to QR contains a whole record of the expected form and ends with the prompt."""
     if binary:
         record = answer[: -len(_ACKNOWLEDGED)][-BINARY_SIZE:]
         return answer.endswith(_ACKNOWLEDGED) and len(record) == BINARY_SIZE and record[0] <= _MOST_ERROR
@@ -199,7 +198,7 @@ def answered_record(answer: bytes, *, binary: bool) -> bool:
 
 
 def _ascii_values(line: bytes) -> tuple[int, ...] | None:
-    r"""Return error digit and six values of a line, or None where it is no record.
+    r"""Return error digit and six values of a line, or None where it is not a record.
 
     >>> _ascii_values(b"0,  -102,   -99,  -225,   -20,    39,   -39\r\n")
     (0, -102, -99, -225, -20, 39, -39)
