@@ -1,1 +1,1 @@
-"""What the window knows, decides and says, without Qt."""
+"""State, decisions and texts of the window, without Qt."""

@@ -1,4 +1,4 @@
-"""What must be right before a session can begin, card by card, each with one line that says why not. No Qt."""
+"""The conditions for beginning a session, card by card, each with one line on what is missing. No Qt."""
 
 import re
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ CARD_FIELDS: Mapping[str, tuple[str, ...]] = {
     tr_noop("Transducer"): ("forces", "simulated", "height", "area"),
     tr_noop("Subject's screen"): ("tablet",),
     tr_noop("Disk"): ("folder",),
-}  # of each card, the worst first
+}  # fields of each card, the worst first
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,12 +25,12 @@ class Card:
 
     name: str
     ready: bool
-    text: str  # why not; or what is worth knowing
-    field: str = ""  # the first that is wrong
+    text: str  # what is missing; or useful information
+    field: str = ""  # the first wrong one
 
 
 def checklist(form: SessionForm, bench: Bench, screen: str) -> tuple[Card, ...]:
-    """Return the cards; `screen` says how far the length of the subject's line is known."""
+    """Return the cards; `screen` describes the calibration of the subject's line."""
     record = enrolment(form)
     wrong = refusals(form, bench, record)
     notes = {
@@ -47,13 +47,13 @@ def checklist(form: SessionForm, bench: Bench, screen: str) -> tuple[Card, ...]:
 
 
 def first_missing(cards: tuple[Card, ...]) -> Card | None:
-    """Return the card that comes next: without a transducer that one, else the first that is not ready."""
+    """Return the next card to complete: the transducer's if it is missing, else the first that is not ready."""
     gaps = [card for card in cards if not card.ready]
     return next((card for card in gaps if card.field == "forces"), gaps[0] if gaps else None)
 
 
 def headline(cards: tuple[Card, ...], subject: str) -> str:
-    """Return the one sentence that says what to do next."""
+    """Return the sentence for the next step."""
     first = first_missing(cards)
     match first:
         case None:
@@ -77,7 +77,7 @@ def codes_in(folder: Path) -> tuple[str, ...]:
 
 
 def next_code(codes: tuple[str, ...]) -> str:
-    """Return the code after the highest number that a code ends in; "P01" where there is none.
+    """Return the code after the one with the highest final number; "P01" if there is none.
 
     >>> next_code(("P01", "P09", "pilot")), next_code(())
     ('P10', 'P01')

@@ -1,4 +1,4 @@
-"""What the window knows of the session in hand, and how each message changes it."""
+"""The window's state of the current session, and its changes by each message."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -24,79 +24,79 @@ Phase = Literal[
 REPORTED: frozenset[str] = frozenset(get_args(Phase)) - {"resuming"}  # phases that the recorder reports
 IN_A_TRIAL = frozenset({"mounting", "taring", "ready", "stroking", "scoring", "settling"})
 Outcome = Literal["coming", "done", "skipped"]
-AFTER_LIFT = 1.0  # of unloaded readings stay beside a stroke that is shown: the way back to zero is seen [s]
+AFTER_LIFT = 1.0  # unloaded readings shown after a stroke, to show the return to zero [s]
 PICTURE = {"N": (2, "N"), "T": (2, "N"), "mu": (2, ""), "speed": (0, "mm/s")}  # its rows, with digits and unit
-_MARKS = 40  # that are kept for the plots: more than a minute can hold
+_MARKS = 40  # marks kept for the plots: more than occur in a minute
 
 
 class Remark(NamedTuple):
-    """Something that is wrong with a stroke."""
+    """A flaw of a stroke."""
 
     grade: Grade
-    text: str  # few
-    sentence: str  # the same at length
-    advice: str  # what to do about it, one sentence; empty where no further stroke mends it
+    text: str  # in few words
+    sentence: str  # in full
+    advice: str  # the remedy, one sentence; empty if another stroke does not help
 
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """What is known of a stroke before it is scored. Provisional: the analysis of the recording is what counts."""
+    """The provisional quality of a stroke before it is scored. The analysis of the recording decides."""
 
     remarks: tuple[Remark, ...] = ()  # the worst first; none for a good stroke
     stroke: Stroke | None = None
-    friction: FrictionParameters | None = None  # that the model is to get
-    fell: float | None = None  # by what share N fell from the first to the last quarter of the steady window [-]
+    friction: FrictionParameters | None = None  # the model's input
+    fell: float | None = None  # relative fall of N from the first to the last quarter of the steady window [-]
 
     @property
     def grade(self) -> Literal["good", "doubtful", "refused"]:
-        """Return that of the worst; a mere note is a doubt here."""
+        """Return the grade of the worst remark; a note counts as doubtful."""
         if any(remark.grade == "refused" for remark in self.remarks):
             return "refused"
         return "doubtful" if self.remarks else "good"
 
     @property
     def texts(self) -> tuple[str, ...]:
-        """Return what is wrong in few words, each once."""
+        """Return the short texts of the remarks, each once."""
         return tuple(dict.fromkeys(remark.text for remark in self.remarks))
 
     @property
     def sentences(self) -> str:
-        """Return what is wrong at length."""
+        """Return the full sentences of the remarks."""
         return " ".join(remark.sentence for remark in self.remarks)
 
 
 class Judged(Struct, frozen=True):
-    """A stroke was looked at."""
+    """The quality of a stroke was judged."""
 
     trial: int
     take: int
     quality: Quality
-    live: bool = True  # False: from before an interruption, in the time of a stream that has ended
+    live: bool = True  # False: from before an interruption, with the times of an ended stream
 
 
 @dataclass(frozen=True, slots=True)
 class TrialState:
-    """How far a trial is."""
+    """The progress of a trial."""
 
     trial: Trial
     outcome: Outcome = "coming"
     takes: int = 0
-    answer: str | None = None  # in words; None: none was asked for yet
+    answer: str | None = None  # in words; None: not asked yet
     quality: Quality | None = None
-    discard_reason: str = ""  # why its last take but the one in hand no longer counts; empty: none was discarded
-    has_stimulus: bool = True  # False: answers to come choose its stimulus
+    discard_reason: str = ""  # why its previous take was discarded; empty: none was
+    has_stimulus: bool = True  # False: later answers choose its stimulus
 
     @property
     def code(self) -> str:
-        """Return the label of its stimulus, or dots where that is not chosen yet."""
+        """Return the label of its stimulus, or an ellipsis if that is not chosen yet."""
         return self.trial.stimulus.code if self.has_stimulus else "…"
 
-    earlier: tuple["TrialState", ...] = ()  # as it was when each of its takes was discarded
+    earlier: tuple["TrialState", ...] = ()  # its state when each of its takes was discarded
 
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """Something found in the readings, for the plots."""
+    """An event in the readings, for the plots."""
 
     kind: Literal["onset", "lift", "steady"]
     start: float  # [s, device time]
@@ -104,9 +104,9 @@ class Mark:
 
 
 def picture_end(marks: tuple[Mark, ...], newest: float) -> float:
-    """Return the instant at which a picture of the readings ends [s, device time].
+    """Return the end of the time axis of a plot of the readings [s, device time].
 
-    After a lift the stroke stays where it is until the next onset, however long its score is awaited.
+    After a lift the plot stands still until the next onset.
 
     >>> picture_end((Mark("onset", 1.0, 1.0), Mark("lift", 3.0, 3.0)), 40.0)
     4.0
@@ -119,51 +119,51 @@ def picture_end(marks: tuple[Mark, ...], newest: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class SessionState:
-    """The course of the session in hand."""
+    """The current session."""
 
     folder: str
     plan: SessionPlan
     people: Kind
     simulated: str | None
     trials: tuple[TrialState, ...]
-    start: float  # when it began, also where it was interrupted since [s]
+    start: float  # when it first began, even if it was interrupted since [s]
     phase: Phase = "idle"
     since: float = 0.0  # when this phase began [s]
     before_pause: Phase = "idle"
-    trial: int | None = None  # number of the trial in hand
+    trial: int | None = None  # number of the current trial
     block: Block | None = None
-    command: steps.Command | None = None  # what is waited for
-    notice: str | None = None  # the last sentence that needs no answer, or that refuses one
+    command: steps.Command | None = None  # the command that waits for an act
+    notice: str | None = None  # the last message that needs no answer, or refuses one
     redone: tuple[int, ...] = ()  # numbers of the trials whose redo can still be undone
-    judged_trial: int | None = None  # number of the trial whose stroke was looked at last
-    time_offset: float = 0.0  # of the times in the log to those of the stream that is shown, after a resumption [s]
-    marks: tuple[Mark, ...] = ()  # the last ones, in the time of the session's stream; none once it is over
+    judged_trial: int | None = None  # number of the trial whose stroke was judged last
+    time_offset: float = 0.0  # from the times in the log to those of the displayed stream, after a resumption [s]
+    marks: tuple[Mark, ...] = ()  # the latest, in the time of the session's stream; empty once it is over
     notes: tuple[str, ...] = ()
     status: Status | None = None
-    saved_ns: int = 0  # instant of the last thing that is safe [ns, session clock]
-    saved_at: float | None = None  # when the window heard of it [s]
+    saved_ns: int = 0  # time of the latest safe data [ns, session clock]
+    saved_at: float | None = None  # when the window learned of it [s]
     end: SessionEnd | None = None
     resumable: bool = False
-    fault: str | None = None  # why nothing is recorded any more, where no end was written
+    fault: str | None = None  # why recording stopped without a written end
     sealing: Literal["no", "running", "cut short", "sealed"] = "no"
 
     @property
     def is_over(self) -> bool:
-        """Say whether nothing is recorded any more."""
+        """Say whether recording has stopped."""
         return self.end is not None or self.fault is not None
 
     def trial_state(self, number: int | None) -> TrialState | None:
-        """Return the trial of that number."""
+        """Return the trial with that number, None if there is none."""
         return next((t for t in self.trials if t.trial.number == number), None)
 
-    def with_trial(self, number: int | None, **changes: Any) -> "SessionState":  # noqa: ANN401  as `replace` takes
+    def with_trial(self, number: int | None, **changes: Any) -> "SessionState":  # noqa: ANN401  arguments of `replace`
         """Return the session with one trial changed."""
         trials = tuple(replace(t, **changes) if t.trial.number == number else t for t in self.trials)
         return replace(self, trials=trials)
 
 
 def begin_session(message: m.SessionBegun, now: float) -> SessionState:
-    """Return the state of a session that begins, or goes on, at `now` [s]."""
+    """Return the state of a session that begins, or is resumed, at `now` [s]."""
     trials = tuple(
         TrialState(trial, has_stimulus=trial.standard or not block.candidates)
         for block in message.plan.blocks
@@ -173,11 +173,11 @@ def begin_session(message: m.SessionBegun, now: float) -> SessionState:
     session = SessionState(message.folder, message.plan, message.people, message.simulated, trials, start, since=now)
     for event in message.events:
         session = _fold_event(session, event)
-    return replace(session, marks=())  # theirs is the clock of a stream that has ended
+    return replace(session, marks=())  # they have the times of an ended stream
 
 
 def session_after(session: SessionState, message: object, now: float) -> SessionState:
-    """Return the session after a message that came at `now` [s]; the same object where it does not concern it."""
+    """Return the session after a message received at `now` [s]; the same object if the message does not concern it."""
     changed = _fold_message(session, message, now)
     return changed if changed.phase == session.phase else replace(changed, since=now)
 
@@ -211,7 +211,7 @@ def _fold_end(session: SessionState, message: object) -> SessionState:
         case m.ResumeSession():
             return replace(session, phase="resuming", command=None)
         case m.Failed(kind=""):
-            return session  # a request that has to wait for the end of this session
+            return session  # this request has to wait for the end of the session
         case m.Gone() | m.Failed("StartSession" | "ResumeSession") if session.sealing == "running":
             return replace(session, sealing="cut short")
         case m.Failed(request, sentence) if request in ("StartSession", "ResumeSession") and not session.is_over:
@@ -221,17 +221,17 @@ def _fold_end(session: SessionState, message: object) -> SessionState:
 
 
 def _ended_session(session: SessionState) -> SessionState:
-    """Return the session once nothing is recorded any more; its marks go with the clock of its stream."""
+    """Return the session after recording has stopped, without marks, whose times belong to its stream."""
     return replace(session, phase="ended", command=None, marks=(), redone=())
 
 
 def redo_targets(session: SessionState) -> tuple[TrialState, ...]:
-    """Return the trials that a redo would discard now: one, two that are compared, or none."""
+    """Return the trials that a redo would discard now: one, a compared pair, or none."""
     if session.phase in IN_A_TRIAL - {"mounting"}:
         trial = session.trial_state(session.trial)
     elif session.phase == "closing":
         trial = session.trials[-1]
-    else:  # before the first take of a trial it is the one before
+    else:  # before the first take of a trial, the previous trial
         current = session.trial_state(session.trial) if session.phase == "mounting" else None
         trial = session.trial_state(current.trial.number - 1) if current is not None and not current.takes else None
     if trial is None:
@@ -330,7 +330,7 @@ def _discard(session: SessionState, number: int | None, reason: str) -> SessionS
 
 
 def _restore(session: SessionState, number: int | None, take: int) -> SessionState:
-    """Return the session with a discarded take as the present one again, with its answer and quality."""
+    """Return the session with a discarded take restored, with its answer and quality."""
     state = session.trial_state(number)
     discarded_states = () if state is None else state.earlier
     earlier = next((discarded for discarded in discarded_states if discarded.takes == take), None)
@@ -341,7 +341,7 @@ def _restore(session: SessionState, number: int | None, take: int) -> SessionSta
 
 
 def _judge(session: SessionState, judgement: Judged) -> SessionState:
-    """Return the session with the quality of a stroke; as it is where that take has been repeated."""
+    """Return the session with the quality of a stroke; unchanged if that take has been repeated."""
     state, stroke = session.trial_state(judgement.trial), judgement.quality.stroke
     if state is None or state.takes != judgement.take:
         return session

@@ -1,4 +1,4 @@
-"""From the recorder's live messages to what is drawn and the readings of a take; how far the transducer is loaded."""
+"""Converts the recorder's live messages to plot data and to the readings of a take; reports the transducer's load."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator
@@ -22,36 +22,36 @@ from sessions.strokes.forces import centre_of_pressure, in_face_frame
 from sessions.strokes.settings import RatioSettings
 
 LOADS = (*AXES, tr_noop("combined"))
-_FLOOR = RatioSettings().force_floor  # ratio, speed and centre of pressure mean nothing below this normal force [N]
-LAG = 0.1  # the speed is the way of the centre of pressure over this time [s] ...
-SMOOTH = 0.05  # ... between two means over this one [s]
+_FLOOR = RatioSettings().force_floor  # ratio, speed and centre of pressure are meaningless below this normal force [N]
+LAG = 0.1  # the speed is the displacement of the centre of pressure over this time [s] ...
+SMOOTH = 0.05  # ... between two means over this time [s]
 ARRAYS = ("sequence", "time", "received_ns", "wrench", "status")  # of live readings
-_LONGEST_TAKE = 90.0  # readings of a take that are kept to be looked at, at most [s]
+_LONGEST_TAKE = 90.0  # longest stretch of a take's readings kept for judging [s]
 
 
 @dataclass(frozen=True, slots=True)
 class Load:
     """Greatest shares of the rated range (1: rated load); nan without a range and before the first reading."""
 
-    shares: tuple[float, ...] = (nan,) * 7  # of LOADS, as `drivers.calibration.loads` has them
+    shares: tuple[float, ...] = (nan,) * 7  # of LOADS, by `drivers.calibration.loads`
 
     @property
     def overloads(self) -> tuple[str, ...]:
-        """Return the names of what is beyond its rated load."""
+        """Return the names of the loads beyond their rating."""
         loads = zip(LOADS, self.shares, LIMITS, strict=True)
         return tuple(name for name, share, limit in loads if share > limit)
 
     @property
     def near_limits(self) -> tuple[str, ...]:
-        """Return the names of what is near its rated load, or beyond it."""
+        """Return the names of the loads near or beyond their rating."""
         return tuple(name for name, share in zip(LOADS, self.shares, strict=True) if share > WARNING)
 
 
 def merge_live(reports: Iterable[Report]) -> Iterator[Report]:
-    """Return reports in order, readings that follow each other as one: a window that is late catches up at once."""
+    """Yield reports in order, with successive readings merged, so that a late window catches up quickly."""
 
     def stream_and_zero(report: Report) -> tuple[int, object] | None:
-        """Return what readings must share to be taken as one; None for what are no readings."""
+        """Return the properties that merged readings must share; None for other reports."""
         return (report.stream, report.zero) if isinstance(report, Live) else None
 
     for key, group in groupby(reports, key=stream_and_zero):
@@ -68,7 +68,7 @@ def _join(lives: list[Live]) -> Live:
 
 
 class LiveFeed:
-    """Everything of the stream that is shown now. One per window."""
+    """The displayed data of the current stream. One per window."""
 
     def __init__(self) -> None:
         self.trace = LiveTrace(1000.0)
@@ -86,7 +86,7 @@ class LiveFeed:
         self.trace = LiveTrace(1000.0 if info is None else info.rate)
 
     def take_begins(self) -> None:
-        """Keep readings from now on for a new take."""
+        """Begin to keep readings for a new take."""
         self._take.clear()
 
     def add(self, live: Live, frame: Frame) -> None:
@@ -100,7 +100,7 @@ class LiveFeed:
             self._sequence = None
             self.trace.clear()
         previous = live.sequence[0] - 1 if self._sequence is None else self._sequence
-        gaps = np.flatnonzero(np.diff(live.sequence, prepend=previous) > 1)  # before these, others are missing
+        gaps = np.flatnonzero(np.diff(live.sequence, prepend=previous) > 1)  # readings are missing before these
         time, values = with_gaps(live.time, self._channels(live, frame), gaps)
         self._sequence = int(live.sequence[-1])
         self._take.append(live)
@@ -109,7 +109,7 @@ class LiveFeed:
         self.trace.add(time, values)
 
     def take(self) -> ReadingBlock:
-        """Return the readings of the take in hand, as a wrench: N, N mm."""
+        """Return the readings of the current take as wrenches [N, N mm]."""
         if not self._take:
             return ReadingBlock.empty()
         take = _join(list(self._take))
@@ -117,7 +117,7 @@ class LiveFeed:
         return ReadingBlock(sequence, sequence, take.status, take.time, take.received_ns, raw=wrench)
 
     def _channels(self, live: Live, frame: Frame) -> Array:
-        """Return what is drawn (channels, n); nan where a value means nothing."""
+        """Return the plotted channels (channels, n); nan for a meaningless value."""
         wrench = in_face_frame(live.wrench, frame)
         normal = -wrench[:, 2]
         tangential = np.hypot(wrench[:, 0], wrench[:, 1])
@@ -135,7 +135,7 @@ class LiveFeed:
 
 @dataclass(frozen=True, slots=True)
 class _Tail:
-    """The last moments of the centre of pressure: what the speed of the next reading needs."""
+    """The latest positions of the centre of pressure, from which the speed at the next reading is computed."""
 
     time: Array = field(default_factory=lambda: np.empty(0))  # (k,)
     position: Array = field(default_factory=lambda: np.empty((0, 2)))  # (k, 2)
@@ -144,7 +144,7 @@ class _Tail:
         """Return the next tail and the speed (n,) [mm/s] at each of n further readings."""
         times = np.concatenate([self.time, time])
         positions = np.concatenate([self.position, position])
-        origin = times[0]  # so that sums of times stay exact
+        origin = times[0]  # keeps sums of times exact
         rows = np.column_stack([np.nan_to_num(positions), times - origin])
         total = np.vstack([np.zeros((1, 3)), np.cumsum(rows, axis=0)])
         bad = np.concatenate([[0], np.cumsum(np.isnan(positions[:, 0]))])
@@ -162,7 +162,7 @@ class _Tail:
 
 
 def _mean(total: Array, bad: Indices, starts: Indices, stops: Indices) -> tuple[Array, Mask]:
-    """Return means (n, 3) of position and time from `starts` to `stops`, and which have no unknown reading in them."""
+    """Return means (n, 3) of position and time from `starts` to `stops`, and which contain no unknown reading."""
     count = stops - starts
     with np.errstate(divide="ignore", invalid="ignore"):
         mean = (total[stops] - total[starts]) / count[:, None]

@@ -1,8 +1,8 @@
-"""What the model says of the finger while it moves: measured forces in, the SED at the receptor and a picture out.
+"""The model of the moving finger: measured forces in, the SED at the receptor and a picture out.
 
-The friction of a surface is not known before it was stroked. So mu and the traction bound are those of this touch so
-far: the largest T/N, and the largest T over the contact area. Until the finger slides, the model slips too early. The
-whole tangential force is taken to act along the finger, in the sense of its part along x: the model is plane.
+The friction of a surface is unknown before its stroke. So mu and the traction bound are the largest values so far in
+this contact, of T/N and of T over the contact area. Until the finger slides, the model slips too early. The
+model is plane: it applies the whole tangential force along the finger, with the sign of its component along x.
 """
 
 from collections import deque
@@ -25,18 +25,18 @@ from solver.prediction import ROW, Prediction, percent
 from solver.response.fields import fields_of
 from solver.response.stepper import LivePicture, stepper
 
-TOUCH = 0.05  # less normal force is no touch [N]
-_FLOOR = RatioSettings().force_floor  # a ratio means nothing below this normal force [N]
-LEAST_MU = 0.05  # before any was measured [-]
-_HISTORY = 60.0  # predictions that are kept for the difference to the full solve [s]
-OBSERVATIONS = 100  # states that a stroke keeps, for a full solve that fails
+TOUCH = 0.05  # least normal force of contact [N]
+_FLOOR = RatioSettings().force_floor  # the ratio is meaningless below this normal force [N]
+LEAST_MU = 0.05  # before the first measured value [-]
+_HISTORY = 60.0  # predictions kept for the difference from the full solve [s]
+OBSERVATIONS = 100  # states kept of a stroke, in case its full solve fails
 OBSERVATION_EVERY = 0.1  # the time between them [s]
-DEFAULT_DEPTH = 2.0  # for which the mesh is made where no plan states one [mm]
-DEFAULT_AREA = 100.0  # of contact, for the traction bound, likewise [mm2]
+DEFAULT_DEPTH = 2.0  # for the mesh, without a plan [mm]
+DEFAULT_AREA = 100.0  # of contact, for the traction bound, without a plan [mm2]
 
 
 def live_scene(plan: SessionPlan | None, kinematics: Kinematics = "small") -> Scene:
-    """Return the finger to follow: the published one with what the plan knows of the subject's own."""
+    """Return the finger to follow: the published one with the subject's own values from the plan."""
     options = PredictionOptions() if plan is None else with_own_finger(PredictionOptions(), plan)
     depth = max((block.indentation for block in plan.blocks), default=DEFAULT_DEPTH) if plan else DEFAULT_DEPTH
     base = options.scene or Scene(friction=Friction(0.0), loading=Loading(depth))
@@ -46,7 +46,7 @@ def live_scene(plan: SessionPlan | None, kinematics: Kinematics = "small") -> Sc
 def settled_scene(
     plan: SessionPlan, friction: FrictionParameters, normal_force: float, kinematics: Kinematics = "small"
 ) -> Scene | None:
-    """Return the scene of a finished stroke, pressed by its measured force [N]; None where it gives no friction."""
+    """Return the scene of a finished stroke, pressed by its measured force [N]; None if it has no friction."""
     if friction.mu is None or friction.direction is None or normal_force <= 0.0:
         return None
     speed = friction.speed or DEFAULT_SPEED
@@ -62,7 +62,7 @@ class _Observation:
     time: float  # [s, device time]
     row: Array
     picture: Picture
-    rest_nodes: Array  # (n, 2) where its nodes are while nothing touches [mm]
+    rest_nodes: Array  # (n, 2) undeformed [mm]
     depth: float
 
 
@@ -70,10 +70,10 @@ class _Model:
     def __init__(self, scene: Scene) -> None:
         self.stepper = stepper(scene)
         self.picture = LivePicture(self.stepper.finger)
-        self.picture.sed(self.stepper.state)  # what it needs is made at once
+        self.picture.sed(self.stepper.state)  # prepares its data in advance
 
     def picture_and_rest(self) -> tuple[Picture, Array]:
-        """Return the picture, and the positions of its nodes while nothing touches (n, 2) [mm]."""
+        """Return the picture, and the undeformed positions of its nodes (n, 2) [mm]."""
         state, picture = self.stepper.state, self.picture
         nodes, sed = picture.nodes(state), picture.sed(state)
         return Picture(nodes, picture.faces, sed, self.stepper.outline()), picture.rest
@@ -82,29 +82,29 @@ class _Model:
 class Follower:
     """Follows one finger, batch by batch; holds the steppers' states and the last minute of predictions.
 
-    Small strain is always followed. Where finite strain is asked for, its values are shown as far as it has any.
+    Small strain is always followed. If finite strain is requested, its values are shown wherever it has any.
     """
 
     def __init__(self, use: Use) -> None:
-        """Mesh and condense the finger. Raises SceneError or MeshError where it cannot be meshed."""
+        """Mesh and condense the finger. Raises SceneError or MeshError if it cannot be meshed."""
         self._finger = _finger(use)
         scene, self._area, _ = self._finger
         self._kinematics: Kinematics = use.kinematics
         self._scene = scene
         finite = (live_scene(use.plan, "finite"),) if use.kinematics == "finite" else ()
         self._models = [*map(_Model, (scene, *finite))]  # at small strain, and at finite strain
-        self._reached = False  # by finite strain, at the last step
+        self._reached = False  # whether finite strain reached the last step
         self._mu, self._tangential = LEAST_MU, 0.0
         self._stream: int | None = None
         self._seds: deque[tuple[float, float]] = deque()
         self._observations: deque[_Observation] = deque(maxlen=OBSERVATIONS)
 
     def follows(self, use: Use) -> bool:
-        """Say whether it follows just this finger already."""
+        """Say whether it already follows this finger."""
         return self._finger == _finger(use)
 
     def take(self, forces: Forces) -> Provisional:
-        """Return what the model says of a batch."""
+        """Return the model's prediction for a batch of forces."""
         if forces.stream != self._stream:
             self._stream = forces.stream
             self._seds.clear()
@@ -126,7 +126,7 @@ class Follower:
         )  # fmt: skip
 
     def settled_solver(self, request: Settle) -> Callable[[], SettledSolve]:
-        """Return what solves a stroke in full; it may run while more is taken, and uses the predictions until now."""
+        """Return a function that solves a stroke in full; it may run in parallel and uses the predictions so far."""
         first, last = request.steady
         values = np.array([sed for time, sed in self._seds if first <= time <= last])
         values = values[np.isfinite(values)]
@@ -136,7 +136,7 @@ class Follower:
         return lambda: _solve_settled(request, self._kinematics, provisional, latest)
 
     def _step(self, normal: float, pull: float) -> tuple[float, bool]:
-        """Return the SED under forces [N], and whether it is of finite strain; nothing that touches is within reach."""
+        """Return the SED under forces [N], and whether it is of finite strain; nan beyond the model's reach."""
         if normal < TOUCH:
             self._forget_contact()
             return 0.0, True
@@ -144,7 +144,7 @@ class Follower:
             self._mu = max(self._mu, abs(pull) / normal)
             self._tangential = max(self._tangential, abs(pull))
         normal, pull = normal / self._scene.finger.width, pull / self._scene.finger.width
-        # The traction bound so far [MPa] is, as the analysis has it, the largest T over the contact area.
+        # The traction bound so far [MPa] is the largest T over the contact area, as in the analysis.
         bound = self._tangential / self._area if self._tangential > 0.0 else np.inf
         for model in self._models:
             model.stepper.mu, model.stepper.tau = self._mu, bound
@@ -162,7 +162,7 @@ class Follower:
 def _solve_settled(
     request: Settle, kinematics: Kinematics, provisional: float | None, last: _Observation | None
 ) -> SettledSolve:
-    """Solve a stroke in full; where that fails, return why, with the last state that was followed in its window."""
+    """Return the full solve of a stroke; if it fails, the reason and the last followed state in its window."""
     scene = settled_scene(request.plan, request.friction, request.normal_force, kinematics)
     reason, failed, prediction = tr("The stroke gives no friction."), False, None
     try:
@@ -186,16 +186,16 @@ def _solve_settled(
 
 
 def _greatest_effect(prediction: Prediction) -> str:
-    """Return which effect that the model leaves out changes the SED most, and how much; "" without an estimate."""
+    """Return the largest omitted effect on the SED and its size; "" without an estimate."""
     effects = ((effect["estimate"], name) for name, effect in prediction.model["left_out"].items())
     size, name = max((pair for pair in effects if pair[0] is not None), default=(0.0, ""))
     return name and f"{name} {percent(size)} of the SED"
 
 
 def place_of_greatest_shortening(undeformed: Array, deformed: Array, faces: Indices) -> tuple[float, float]:
-    """Return the middle (x, y) [mm] of the face that is shortened most in any direction.
+    """Return the centre (x, y) [mm] of the face with the smallest stretch in any direction.
 
-    `undeformed` and `deformed` are nodes (n, 2), `faces` (f, 4); each face is taken to stretch as its diagonals do.
+    `undeformed` and `deformed` are nodes (n, 2), `faces` (f, 4); the diagonals of a face define its stretch.
 
     >>> square = np.array([[0.0, 0.0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]])
     >>> pressed = square * [1.0, 0.5] + [[0, 0], [0, 0], [-0.8, 0]] * 2

@@ -18,13 +18,13 @@ Kinematics = Literal["small", "finite"]
 
 _STEP = 0.005  # readings within this time are one step of the model [s]: 200 a second
 _GAP = 0.1  # predictions further apart have a gap between them [s]
-MODEL_CHANNELS = ("SED", "SED instead")  # the latter at small strain, where finite strain is asked for and out of reach
+MODEL_CHANNELS = ("SED", "SED instead")  # the latter at small strain, where finite strain is requested but out of reach
 _KINEMATICS = {"small": tr_noop("small strain"), "finite": tr_noop("finite strain")}
 
 
 @dataclass(frozen=True, slots=True)
 class Use:
-    """Follow the finger of this plan from now on; without one, the published finger."""
+    """Follow the finger of this plan from now on, or without a plan the published finger."""
 
     plan: SessionPlan | None
     kinematics: Kinematics
@@ -32,45 +32,45 @@ class Use:
 
 @dataclass(frozen=True, slots=True)
 class Ready:
-    """The finger is made; `problem` says why there is none."""
+    """The finger is ready; otherwise `problem` says why not."""
 
     problem: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Forces:
-    """Measured forces, n of them, at most 200 a second."""
+    """n measured forces, at most 200 a second."""
 
     time: Array  # (n,) [s, device time]
     normal: Array  # (n,) [N], positive when pressing
-    pull: Array  # (n,) of the surface on the finger along +x [N]
+    pull: Array  # (n,) tangential force of the surface on the finger along +x [N]
     received_ns: int  # when the newest reached the computer [ns, session clock]
-    stream: int  # grows where time restarts
+    stream: int  # increases when time restarts
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """A finger as it is drawn: the surface is y = 0."""
+    """A finger's drawing data; the surface is y = 0."""
 
     nodes: Array  # (n, 2) [mm]
-    faces: Indices  # (f, 3 or 4); none where only the outline is known
+    faces: Indices  # (f, 3 or 4); empty if only the outline is known
     sed: Array  # (f,) [MPa]
     outline: Array  # (w, 2) deformed skin [mm]
-    lost: tuple[float, float] | None = None  # where tissue is squeezed most [mm], of a state that led nowhere
+    lost: tuple[float, float] | None = None  # most compressed point [mm] of a state without a continuation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Provisional:
-    """What the model says now, of one batch of forces."""
+    """The provisional prediction for one batch of forces."""
 
     time: Array  # (n,) [s, device time]
-    sed: Array  # (n,) at the receptor [MPa]; 0 where nothing touches, nan beyond the model's reach
+    sed: Array  # (n,) at the receptor [MPa]; 0 without contact, nan beyond the model's reach
     row: Array  # (r,) along the skin at the receptor's depth, at `solver.prediction.ROW` [MPa]
     picture: Picture
-    depth: float  # of the bone, below first touch [mm]
-    mu: float  # taken so far [-]
-    kinematics: Kinematics  # that is asked for
-    instead: Mask  # (n,) whose values are of small strain, the forces being too large for finite strain
+    depth: float  # of the bone, below first contact [mm]
+    mu: float  # used so far [-]
+    kinematics: Kinematics  # the requested one
+    instead: Mask  # (n,) True for values at small strain, where forces are too large for finite strain
     received_ns: int
     stream: int
 
@@ -82,7 +82,7 @@ class Provisional:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Settle:
-    """Asks for the full solve of a stroke, to replace what was provisional."""
+    """Request for the full solve of a stroke, which replaces the provisional values."""
 
     plan: SessionPlan
     friction: FrictionParameters
@@ -92,22 +92,22 @@ class Settle:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SettledSolve:
-    """The full solve of a stroke, with the mean of what was shown live."""
+    """The full solve of a stroke, with the mean of its live values."""
 
     steady: tuple[float, float]  # of the stroke [s, device time]
-    sed: float | None  # [MPa]; None where `reason` says why
+    sed: float | None  # [MPa]; None for the `reason` given
     error: float | None  # its estimated relative error [-]
-    provisional: float | None  # mean over the steady window of what was shown [MPa]; None where nothing was
+    provisional: float | None  # mean live value over the steady window [MPa]; None if there was none
     row: Array  # (r,) [MPa]
-    picture: Picture | None  # of the full solve; where it failed, of the last state that was followed
+    picture: Picture | None  # of the full solve; if it failed, of the last followed state
     depth: float | None  # [mm]
     kinematics: Kinematics
     reason: str = ""
-    effect: str = ""  # of what the model leaves out, the greatest; empty without an estimate
+    effect: str = ""  # the largest omitted effect; empty without an estimate
 
     @property
     def difference(self) -> float | None:
-        """Return by which part of the full solve the provisional value is larger [-]; None where one is missing.
+        """Return the excess of the provisional value, relative to the full solve [-]; None if either is missing.
 
         >>> SettledSolve((1.2, 2.0), 0.004, 0.01, 0.005, np.empty(0), None, 2.0, "small").difference
         0.25
@@ -118,7 +118,7 @@ class SettledSolve:
 
 
 def forces_of(live: Live, frame: Frame) -> Forces | None:
-    """Return the forces of a message, means of the healthy readings in each step; None where there is none."""
+    """Return the forces of a message, means of the sound readings in each step; None if there are none."""
     healthy = live.status == 0
     if not healthy.any():
         return None
@@ -134,7 +134,7 @@ def forces_of(live: Live, frame: Frame) -> Forces | None:
 
 
 def join_forces(batches: list[Forces]) -> Forces:
-    """Return several batches of one stream as one."""
+    """Join several batches of one stream."""
     names = ("time", "normal", "pull")
     arrays: dict[str, Any] = {name: np.concatenate([getattr(batch, name) for batch in batches]) for name in names}
     return replace(batches[-1], **arrays)
@@ -151,7 +151,7 @@ class ModelText:
 def model_text(
     provisional: Provisional | None, settled: SettledSolve | None, problem: str, *, silent: bool = False
 ) -> ModelText:
-    """Return the text about the displayed picture; where the transducer is `silent`, nothing is measured now."""
+    """Return the text about the displayed picture; a `silent` transducer measures nothing now."""
     if problem:
         return ModelText(tr("No live model: {problem}.", problem=problem), "none")
     if settled is not None:

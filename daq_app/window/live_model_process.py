@@ -1,4 +1,4 @@
-"""The live model's own process, and its client in the window: one batch is under way at a time, nothing ever waits."""
+"""The live model's process, and its client in the window: at most one batch is under way, and no call waits."""
 
 import signal
 import threading
@@ -22,15 +22,15 @@ from daq_app.window.live_model import (
 from daq_app.wording import tr
 from sessions.plan.plan import Frame, SessionPlan
 
-Connection = Any  # one end of a pipe; its type is another one on each system
-_OLDEST = 2.0  # forces older than this are dropped, where the model does not keep up [s]
+Connection = Any  # one end of a pipe; its type differs between systems
+_OLDEST = 2.0  # older forces are dropped if the model does not keep up [s]
 
 
 def run(connection: Connection) -> None:
     """Serve the window until it is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the window decides when this ends
     give_way()
-    # Loaded in the process alone: the window has no need of the solver, and opens sooner without it.
+    # Loaded in this process only: the window does not need the solver, and opens sooner without it.
     from daq_app.window.live_follower import Follower
     from solver import SceneError
     from solver.mesh import MeshError
@@ -39,7 +39,7 @@ def run(connection: Connection) -> None:
     lock = threading.Lock()
 
     def send(message: Ready | Provisional | SettledSolve) -> None:
-        with lock, suppress(OSError):  # a window that is gone is noticed below
+        with lock, suppress(OSError):  # a closed window is noticed below
             connection.send(message)
 
     def solve(solver: Callable[[], SettledSolve]) -> None:
@@ -50,7 +50,7 @@ def run(connection: Connection) -> None:
             match connection.recv():
                 case Use() as use:
                     try:
-                        if follower is None or not follower.follows(use):  # meshing takes its time
+                        if follower is None or not follower.follows(use):  # meshing is slow
                             follower = Follower(use)
                         problem = ""
                     except (SceneError, MeshError) as error:
@@ -59,37 +59,37 @@ def run(connection: Connection) -> None:
                 case Forces() as forces if follower is not None:
                     send(follower.take(forces))
                 case Settle() as request:
-                    if follower is not None:  # beside the next stroke, which is followed meanwhile
+                    if follower is not None:  # in parallel with following the next stroke
                         threading.Thread(target=solve, args=(follower.settled_solver(request),), daemon=True).start()
                 case _:
                     send(Ready(tr("no finger to follow")))
 
 
 class LiveModel:
-    """The live model as the window sees it. `add` and `poll` never wait for it."""
+    """The window's client of the live model. `add` and `poll` never wait."""
 
     def __init__(self) -> None:
         self.provisional: Provisional | None = None  # the newest
-        self.settled: SettledSolve | None = None  # of the last stroke; None again once another begins
-        self.problem = ""  # why there are no predictions; empty where all is well
-        self.predictions = 0  # that came so far
+        self.settled: SettledSolve | None = None  # of the last stroke; None once another begins
+        self.problem = ""  # why there are no predictions; empty if there are
+        self.predictions = 0  # number received
         self._child: Child | None = None
         self._under_way = 0
         self._unsent: list[Forces] = []
         self._requests: list[Use | Forces | Settle] = []
-        self._steady: tuple[float, float] | None = None  # steady window of the last stroke, until another touch
+        self._steady: tuple[float, float] | None = None  # steady window of the last stroke, until the next contact
         self._plan: SessionPlan | None = None
-        self.kinematics: Kinematics = "small"  # that is asked for
+        self.kinematics: Kinematics = "small"  # the requested one
 
     def prepare(self) -> None:
-        """Start the process; it follows the published finger until a plan states another."""
+        """Start the process, which follows the published finger until a plan gives another."""
         if self._child is None:
             self._child = Child(run, name="live model")
             self._under_way, self.problem = 0, ""
             self._use()
 
     def close(self) -> None:
-        """Let it end."""
+        """End the process."""
         if self._child is not None:
             self._child.close()
         self._child = None
@@ -98,12 +98,12 @@ class LiveModel:
         """Follow the finger of another plan."""
         self._plan, self.settled, self._steady = plan, None, None
         if self._child is None and self.problem:
-            self.prepare()  # one that has ended gets another chance with the next session
+            self.prepare()  # restarts a process that has ended
         else:
             self._use()
 
     def follow_at(self, kinematics: Kinematics) -> None:
-        """Follow the same finger in this kinematics."""
+        """Follow the same finger with other kinematics."""
         if kinematics != self.kinematics:
             self.kinematics = kinematics
             self._use()
@@ -120,19 +120,19 @@ class LiveModel:
             self._unsent.pop(0)
 
     def settle(self, request: Settle) -> None:
-        """Ask for the full solve of a stroke, once all that was added until now was followed."""
+        """Request the full solve of a stroke, after the forces added so far."""
         if self._child is not None:
             self._requests += [join_forces(self._unsent), request] if self._unsent else [request]
             self._unsent = []
 
     def poll(self) -> tuple[Provisional, ...]:
-        """Take what came, and send what waits; return the predictions that are new."""
+        """Receive messages, send waiting requests, and return the new predictions."""
         if self._child is None:
             return ()
         news: list[Provisional] = []
         try:
             while (message := self._child.receive()) is not None:
-                self._under_way -= not isinstance(message, SettledSolve)  # it comes when it comes
+                self._under_way -= not isinstance(message, SettledSolve)  # a full solve comes at any time
                 self._take(message)
                 news += [message] if isinstance(message, Provisional) else []
             if not self._under_way:
@@ -149,10 +149,10 @@ class LiveModel:
             case Provisional():
                 self.provisional = message
                 self.predictions += 1
-                if message.sed.any():  # its forces came after the stroke: something touches again
+                if message.sed.any():  # its forces are later than the stroke: the finger touches again
                     self.settled = self._steady = None
             case SettledSolve():
-                if message.steady == self._steady:  # a slow one may be of a stroke before
+                if message.steady == self._steady:  # a slow one may belong to an earlier stroke
                     self.settled = message
 
     def _send(self, child: Child) -> None:

@@ -1,4 +1,4 @@
-"""The last minute of readings, kept for drawing in columns of pixels; and the scale of a plot and its numbers."""
+"""The last minute of readings, reduced to columns of pixels for drawing; scale and ticks of a plot."""
 
 from dataclasses import dataclass
 
@@ -9,19 +9,19 @@ from drivers.arrays import Array, Indices
 
 CHANNELS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz", "N", "T", "mu", "speed", "x", "y")
 _LONGEST = 60.0  # longest trace [s]
-_GAP = 5.0  # time step by the usual one from which there is a gap, where no reading was counted as lost [-]
+_GAP = 5.0  # time step, relative to the usual one, that counts as a gap even without lost readings [-]
 _STEPS = (1.0, 2.0, 5.0, 10.0)
-SCALE_MARGIN = 0.05  # share of the scale that is drawn beyond it [-]
+SCALE_MARGIN = 0.05  # margin drawn beyond the scale, relative to it [-]
 SHRINK = 0.25  # used share below which a scale shrinks [-] ...
 _PATIENCE = 20.0  # ... after this time [s]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
-    """What is drawn of one stretch of time: the least and the greatest value in each of k columns of pixels.
+    """Plot data of one stretch of time: the least and the greatest value in each of k columns of pixels.
 
     `time` (2 k,) [s] holds each column's instant twice, `values` (channels, 2 k) its least and greatest in the order
-    in which the curve passes them. nan where no reading lies in a column: a gap stays a gap.
+    in which the curve passes them. A column without readings has nan, so that a gap stays a gap.
     """
 
     time: Array
@@ -29,16 +29,16 @@ class Columns:
 
 
 class LiveTrace:
-    """A ring of readings. The only thing here that changes; nothing is recorded from it."""
+    """A ring buffer of readings, for display only."""
 
     def __init__(self, rate: float, channels: int = len(CHANNELS), gap: float | None = None) -> None:
-        """Keep `_LONGEST` seconds of readings at `rate` [Hz]; times further apart than `gap` [s] have a gap between."""
+        """Keep `_LONGEST` seconds of readings at `rate` [Hz]; a time step above `gap` [s] is a gap."""
         self.rate = rate if np.isfinite(rate) and rate > 0 else 1000.0
         self._gap = _GAP / self.rate if gap is None else gap
         self._capacity = int(self.rate * _LONGEST * 1.05) + 16
         self._time = np.full(2 * self._capacity, np.nan)
         self._values = np.full((channels, 2 * self._capacity), np.nan, np.float32)
-        self._stop = 0  # one behind the newest; the ring is written from left to right and moved when full
+        self._stop = 0  # one after the newest; the buffer is written from left to right and shifted when full
         self._start = 0
         self._full = False  # whether readings were dropped for newer ones
         self._columns = self._no_columns()
@@ -66,7 +66,7 @@ class LiveTrace:
         return float(self._time[self._stop - 1]) if self._stop > self._start else None
 
     def holds(self, first: float) -> bool:
-        """Return whether no reading since `first` [s] was dropped for a newer one."""
+        """Say whether all readings since `first` [s] are still held."""
         return not self._full or float(self._time[self._start]) <= first
 
     def clear(self) -> None:
@@ -84,8 +84,8 @@ class LiveTrace:
     def columns(self, first: float, last: float, count: int) -> Columns:
         """Return about `count` columns of the readings from `first` to `last` [s]; few readings one by one.
 
-        Columns lie at whole multiples of their width from time 0, so that a picture that moves on does not shimmer, and
-        only those that are new since the last call are made: a frame costs the same however long the stretch is.
+        Columns are at integer multiples of their width from time 0, so that a moving plot does not shimmer. Only
+        columns that are new since the last call are computed: a frame's cost does not depend on the stretch.
         """
         start, stop = self._positions(first, last)
         if stop - start <= 2 * count:
@@ -109,16 +109,16 @@ class LiveTrace:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Columns:
-    """Columns made so far; the newest is open, since readings may still fall into it."""
+    """Columns computed so far; the newest is open, since it may get more readings."""
 
     width: float  # of a column [s]
-    first: float  # stretch they were begun for [s]
+    first: float  # start of their stretch [s]
     numbers: Indices  # (k,) time / width
     pairs: NDArray[np.float32]  # (c, 2 k)
 
     @property
     def open_from(self) -> float:
-        """From which time on readings are needed [s]."""
+        """Return the time from which readings are needed [s]."""
         return float(self.numbers[-1]) * self.width if len(self.numbers) else self.first
 
     def advance(self, time: Array, values: NDArray[np.float32], first: float) -> "_Columns":
@@ -152,7 +152,7 @@ def _pairs(values: NDArray[np.float32], starts: Indices) -> NDArray[np.float32]:
 
 
 def with_gaps(time: Array, values: Array, gaps: Indices) -> tuple[Array, Array]:
-    """Return times (n,) and values (channels, n) with a nan before the places `gaps`: a line there is no reading."""
+    """Return times (n,) and values (channels, n) with nan inserted before the positions `gaps`, to break the line."""
     if not len(gaps):
         return time, values
     times: Array = np.insert(time, gaps, time[gaps])
@@ -161,11 +161,11 @@ def with_gaps(time: Array, values: Array, gaps: Indices) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True)
 class PlotScale:
-    """From `low` to `high`; both 0, or a step: 1, 2 or 5 times a power of ten."""
+    """A plot's range from `low` to `high`, each 0 or a step: 1, 2 or 5 times a power of ten."""
 
     low: float
     high: float
-    least: float  # the smallest span that is shown [unit of the data]
+    least: float  # the smallest span shown [unit of the data]
     last_use: float = 0.0  # when the scale was last needed [s]
 
     def following(self, least: float, greatest: float, now: float) -> "PlotScale":
@@ -179,7 +179,7 @@ class PlotScale:
         >>> PlotScale(0.0, 20.0, 5.0).following(0.0, 1.0, 30.0).high
         5.0
         """
-        if not (least <= greatest):  # nothing is known
+        if not (least <= greatest):  # nan: no data
             return self
         margin = SCALE_MARGIN * (self.high - self.low)
         if greatest > self.high + margin or least < self.low - margin:
@@ -196,7 +196,7 @@ class PlotScale:
 
 
 def ticks(low: float, high: float, room: float) -> tuple[float, ...]:
-    """Return the values from `low` to `high` that get a number, where `room` lines of text find room along the axis.
+    """Return the values from `low` to `high` that get a label, if `room` lines of text fit along the axis.
 
     >>> ticks(-5.0, 5.0, 8.0), ticks(-5.0, 5.0, 3.0), ticks(-5.0, 5.0, 1.2), ticks(-0.5, 5.0, 6.0)
     ((-5.0, -2.5, 0.0, 2.5, 5.0), (-5.0, 0.0, 5.0), (-5.0, 5.0), (0.0, 2.5, 5.0))
@@ -210,7 +210,7 @@ def ticks(low: float, high: float, room: float) -> tuple[float, ...]:
 
 
 def times(seconds: float, room: float) -> tuple[float, ...]:
-    """Return the instants [s] before now that get a number, where `room` of them find room along the axis.
+    """Return the times [s] relative to now that get a label, if `room` of them fit along the axis.
 
     >>> times(10.0, 12.0), times(60.0, 4.5)
     ((-10.0, -8.0, -6.0, -4.0, -2.0, 0.0), (-60.0, -40.0, -20.0, 0.0))
