@@ -173,7 +173,7 @@ def log1p(x: Array) -> Array:
 
 
 def shape(exponent: Array, Q: Array) -> Array:
-    """Return W by G/2 (...), without the term of ln J, for Ogden's exponents: 16/a^2 sinh^2(a s/2), Q = 4 sinh^2 s."""
+    """Return W / (G/2) (...), without the term of ln J, for Ogden's exponents: 16/a^2 sinh^2(a s/2), Q = 4 sinh^2 s."""
     positive = np.where(np.real(Q) > 0.0, Q, 0.0 * Q)
     if np.all(exponent == NEO_HOOKEAN):
         return positive
@@ -181,7 +181,7 @@ def shape(exponent: Array, Q: Array) -> Array:
 
 
 def slopes(exponent: Array, Q: Array) -> tuple[Array, Array]:
-    """Return f = dW/dQ by G/2, the growth factor of the shear modulus, and df/dQ (...).
+    """Return f = dW/dQ / (G/2), the growth factor of the shear modulus, and df/dQ (...).
 
     f is Gauss's series 2F1(1 + a/2, 1 - a/2; 3/2; -Q/4); its first terms are used where Q is small.
 
@@ -250,12 +250,6 @@ def inverse_metric(F: Array) -> Array:
     return np.stack([scale * yy / J**2, scale * xx / J**2, -scale * xy / J**2, scale + 0.0 * J], axis=-1)
 
 
-def stress_parts(F: Array, T: Array) -> tuple[Array, Array, Array, Array]:
-    """Return J (...), F^-T (..., 2, 2), F T (..., 2, 2) and T:C (...)."""
-    product = F @ np.stack([T[..., [0, 2]], T[..., [2, 1]]], axis=-2)
-    return determinant(F), inverse(np.swapaxes(F, -2, -1)), product, np.sum(product * F, axis=(-2, -1)) + T[..., 3]
-
-
 def overstress(T: Array, F: Array) -> Array:
     """Return the nominal stress (..., 2, 2) [MPa], J^-2/3 (F T - T:C/3 F^-T).
 
@@ -265,8 +259,10 @@ def overstress(T: Array, F: Array) -> Array:
     >>> (overstress(np.array([1.0, 1.0, 0.0, 1.0]), F) @ F.T).round(6)[0, 1].item()
     0.5
     """
-    J, inverse, product, contraction = stress_parts(F, T)
-    return (J ** (-2.0 / 3.0))[..., None, None] * (product - (contraction / 3.0)[..., None, None] * inverse)
+    product = F @ np.stack([T[..., [0, 2]], T[..., [2, 1]]], axis=-2)
+    pressure = (np.sum(product * F, axis=(-2, -1)) + T[..., 3])[..., None, None] / 3.0  # T:C/3
+    scale = (determinant(F) ** (-2.0 / 3.0))[..., None, None]
+    return scale * (product - pressure * inverse(np.swapaxes(F, -2, -1)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

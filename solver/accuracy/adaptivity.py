@@ -40,7 +40,7 @@ MAX_UNKNOWNS = 25_000  # unknowns of a mesh: its nested one has 100,000, which t
 # work, except for a smaller growth, which costs 4 % less in more rounds.
 MAX_DIVISION = 4  # of one gap in a round, at most: an error says little about elements many times smaller
 GROWTH = 1.3  # of the unknowns in a round, at least
-TARGET_ERROR = 0.6  # sum of the parts on the next mesh, by the tolerance
+TARGET_ERROR = 0.6  # sum of the parts on the next mesh, relative to the tolerance
 SHARE_ORDER = 4.0  # power of a gap's size with which its part falls, where solutions are smooth
 _SCALES = 200  # that are tried, each a tenth smaller
 QUADRATIC = line(np.linspace(-1.0, 1.0, 5))[0]  # (5, 3) at the nodes of two elements, by those of the one they divide
@@ -160,9 +160,10 @@ def _grid(finger: Finger[Any]) -> NestedGrid:
 def refine_lines(mesh: FingerMesh, parts: Array | None) -> Lines | None:
     """Return the lines of a finer mesh, or None where no mesh may be finer.
 
-    `parts` (a + b,) are the errors of the columns and rows of `mesh` by the tolerance, None where they are unknown. The
-    fewest lines for a given sum of errors divide a gap into a number of parts that grows as its error per cost of a
-    line to the power 1/(`SHARE_ORDER` + 1). Where errors fall more slowly, at edges and corners, another round follows.
+    `parts` (a + b,) are the errors of the columns and rows of `mesh` relative to the tolerance, None where they are
+    unknown. The fewest lines for a given sum of errors divide a gap into a number of parts that grows as its error per
+    cost of a line to the power 1/(`SHARE_ORDER` + 1). Where errors fall more slowly, at edges and corners, another
+    round follows.
     """
     lines = mesh.lines
     counts = np.array([len(lines.arcs) - 1, lines.rows])

@@ -18,7 +18,7 @@ from solver.scene import Scene
 FORCE_RESIDUAL = 1e-5  # largest relative difference from given forces
 MAX_RESIDUAL = 1e-4  # relative residual from which a state is refused
 WARNING_RESIDUAL = 1e-8  # relative residual from which a warning is given
-WARNING_PENETRATION = 1e-7  # penetration by the indentation from which a warning is given
+WARNING_PENETRATION = 1e-7  # penetration relative to the indentation, from which a warning is given
 State = TypeVar("State")  # with its displacement where that is not part of it
 
 
@@ -30,13 +30,13 @@ def audits(
     `displacement` (nodes, 2) is relative to the bone [mm]; `overstress` (nodes, 2) are the nodal forces of relaxing
     terms [N/mm].
 
-    `equilibrium_x`, `equilibrium_y`: bone reaction plus contact force, by the contact force.
-    `inner_forces`: largest residual at a free node, with the surface's force on nodes in contact, by the contact force.
+    `equilibrium_x`, `equilibrium_y`: bone reaction plus contact force, relative to the contact force. `inner_forces`:
+    largest residual at a free node, with the surface's force on nodes in contact, relative to the contact force.
     `work_balance`: derivative of the stored energy by a factor of the displacement, against that of the work of the
     contact forces, relative. At small strain that is Clapeyron's theorem. It concerns the state and not a load path.
-    `penetration`: of any node of the skin, by the indentation. `tension`: largest tension at a node in contact, by the
-    largest normal force. `cone_violation`: |t| beyond min(mu p, tau_max) on the deformed length, by the largest normal
-    force.
+    `penetration`: of any node of the skin, relative to the indentation. `tension`: largest tension at a node in
+    contact, relative to the largest normal force. `cone_violation`: |t| beyond min(mu p, tau_max) on the deformed
+    length, relative to the largest normal force.
     """
     mesh, condensed = finger.geometry.mesh, finger.newton.condensed
     inner, growth = finger.body.forces(displacement), finger.body.internal_work(displacement)

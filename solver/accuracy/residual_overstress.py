@@ -22,7 +22,7 @@ from solver.prediction import Prediction
 from solver.scene import Scene
 from solver.scene.tables import Relaxation, SceneError
 
-_MARGIN = 4.0  # by the indentation: height of the undeformed skin up to which contact is considered
+_MARGIN = 4.0  # relative to the indentation: height of the undeformed skin up to which contact is considered
 # Elements to a tip radius, and load steps of the press and as many of the slide. Against 16 steps at a fineness of 5,
 # estimates of 42 scenes at small strain differ by 4 % of the SED at most. Against 8 at a fineness of 4, those of 60 at
 # finite strain differ by 5 % of it or a tenth of themselves, but for four, by a sixth: their weights are assumed.

@@ -11,7 +11,7 @@ from solver.mesh.mesher import FingerMesh
 from solver.scene.tables import Receptor
 
 _POINTS, _WEIGHTS = GAUSS_3
-_ASIDE = 2e-8  # distance of probes on both sides of a line between elements, by the tip radius
+_ASIDE = 2e-8  # distance of probes on both sides of a line between elements, relative to the tip radius
 
 
 def endings(finger: FingerMesh, centre: Array, receptor: Receptor, arcs: Array) -> Endings:

@@ -39,7 +39,7 @@ class BranchControl:
     0.17 %, half of the unit or double by 0.7 %.
     """
 
-    tolerance: float = 1e-5  # of a point on the branch, by the length scale of the body
+    tolerance: float = 1e-5  # of a point on the branch, relative to the length scale of the body
     first_step: float = 0.1  # along the branch
     min_step: float = 1e-3
     step_growth: float = 1.5  # ratio of the next step to one with few iterations
@@ -55,7 +55,7 @@ class BranchControl:
     max_force_change: float = 0.05  # relative, in such a step
     max_stretch_change: float = 0.04  # of the least stretch, between consecutive points
     stretch_change_share: float = 0.5  # part of that change at which a step aims
-    displacement_scale: float = 0.1  # by the length scale of the body: counts as much as a friction of 1
+    displacement_scale: float = 0.1  # relative to the length scale of the body: counts as much as a friction of 1
 
 
 BRANCH = BranchControl()

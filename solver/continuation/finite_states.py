@@ -34,7 +34,7 @@ from solver.scene import Scene
 class ForceSearch:
     """Control of the search for a nearby state, and for the depth at which the normal force is the given one."""
 
-    intermediate_tolerance: float = 1e-4  # of displacements, by the length scale of the body
+    intermediate_tolerance: float = 1e-4  # of displacements, relative to the length scale of the body
     depth_factor: float = 1.5  # ratio of the largest depth searched to the one from which the force did not grow
     force_tolerance: float = 1e-9  # of the normal force, relative
     max_searches: int = 20  # steps for the depth

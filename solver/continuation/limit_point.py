@@ -21,7 +21,7 @@ from solver.scene import Scene
 from solver.scene.tables import SHALLOW
 
 FINENESS = 7.0  # elements to a tip radius of both meshes, except at a fold
-_MARGIN = 6.0  # by the indentation: height of the undeformed skin up to which contact is considered
+_MARGIN = 6.0  # relative to the indentation: height of the undeformed skin up to which contact is considered
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class LimitControl:
     resolved_stretch: float = 0.66  # above it, states of the coarse mesh agree with those of the fine one
     sound_stretch: float = 0.65  # from which others may start: neo-Hookean surfaces fold at 0.54
     safe_stretch: float = 0.71  # above it, a state needs no proof: meshes just below a limit have up to 0.70
-    max_fold_shift: float = 0.1  # from its expected place, by the tip radius: beyond, another mesh is made
+    max_fold_shift: float = 0.1  # from its expected place, relative to the tip radius: beyond, another mesh is made
     start_fractions: tuple[float, ...] = (0.3, 0.1, 0.03, 0.01)  # of the depth at which its branch may begin
     near_fold: float = 0.02  # above the critical stretch: some 2 % of the friction
 

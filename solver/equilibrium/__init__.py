@@ -36,7 +36,7 @@ EQUILIBRIUM, BY_DEPTH, BY_FRICTION, BY_TRAVEL = 0, 1, 2, 3  # columns of Newton.
 
 @dataclass(frozen=True, slots=True)
 class NewtonControl:
-    """When the iterations halve a step, keep a tangent or stop; lengths are by the length scale of the body.
+    """When the iterations halve a step, keep a tangent or stop; lengths are relative to the length scale of the body.
 
     Halving or doubling any of these changed no state of eighteen slides, presses and load paths at finite strain by
     more than 6e-10, and the number of tangents by 3 % at most. Without keeping tangents there are 5 % more.
@@ -63,7 +63,7 @@ CONTROL = NewtonControl()
 class Termination(NamedTuple):
     """When the iterations for an equilibrium end: at the larger of two errors, or with a failure at the limit."""
 
-    tolerance: float = 1e-11  # of displacements, by the length scale of the body [-]
+    tolerance: float = 1e-11  # of displacements, relative to the length scale of the body [-]
     relative_to_first: float = 0.0  # of displacements, by the largest of the first step [-]
     max_iterations: int = 25
 

@@ -64,14 +64,14 @@ FINITE_STEPS = LoadSteps(40, first_slide_step=0.1, slide_growth=1.0, max_slide_s
 RELAXING_STEPS = LoadSteps(
     25, first_slide_step=0.02, slide_growth=1.2, max_slide_step=0.1, max_slide=25.0, tolerance=1e-8
 )
-USUAL_SLIDE = 25.0  # slide by the indentation within which states settle, except near the wedging limit
+USUAL_SLIDE = 25.0  # slide relative to the indentation, within which states settle, except near the wedging limit
 
 
 @dataclass(frozen=True, slots=True)
 class RelaxationSteps:
     """The steps of the wait for relaxation at the end of a load path."""
 
-    min_wait: float = 14.0  # by the largest relaxation time: e^-14 is 8e-7
+    min_wait: float = 14.0  # relative to the largest relaxation time: e^-14 is 8e-7
     equal_steps: int = 6  # of one length, before it doubles
     sed_tolerance: float = 1e-6  # relative change of the SED over equal steps below which it is relaxed
     max_doublings: int = 60  # of the step
@@ -123,7 +123,8 @@ class LoadPath:
     ) -> None:
         """Start undeformed, with mu and bound of `friction`; `loading` prescribes depth or forces.
 
-        `tolerance` is that of displacements by the indentation, where that is given. `tissue` is one that relaxes.
+        `tolerance` is that of displacements relative to the indentation, where that is given. `tissue` is one that
+        relaxes.
         """
         self.tissue = tissue
         self.energies: list[Array] = []  # of its endings, at every instant after the first [MPa]

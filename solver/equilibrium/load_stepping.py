@@ -21,7 +21,7 @@ from solver.failures import ContactLost, NotConverged, at_end_of_path
 from solver.progress import check_stop, report_progress
 from solver.scene import Scene
 
-DRAG_TOLERANCE = 1e-9  # error of a drag that is met, by the friction limit
+DRAG_TOLERANCE = 1e-9  # error of a drag that is met, relative to the friction limit
 _UNDER_FORCES = Termination(max_iterations=30)  # the depth is searched too
 
 
@@ -92,7 +92,7 @@ def march(
     """Yield the equilibrium at each load of `course`, from `start` or the undeformed state, with cut-back.
 
     A load is a load state, or forces under the friction of `start`. Backward Euler: within a step a point sticks where
-    it was, or slips from there. `tolerance` is that of displacements, by the length scale of the body. Raises
+    it was, or slips from there. `tolerance` is that of displacements, relative to the length scale of the body. Raises
     NotConverged, saying where, Cancelled, and ValueError for a load that is not allowed.
     """
     state, end = EquilibriumState.undeformed(newton.condensed) if start is None else start, Termination(tolerance)
@@ -114,7 +114,7 @@ def march(
 
 
 State = TypeVar("State")
-_FIRST_STRIDE, _MAX_STRIDE = 1e-8, 0.1  # of the search for a bracket, by the length scale of the body
+_FIRST_STRIDE, _MAX_STRIDE = 1e-8, 0.1  # of the search for a bracket, relative to the length scale of the body
 _MAX_EVALUATIONS = 60  # within the bracket
 
 
@@ -202,9 +202,11 @@ class SlipControl:
     Halving or doubling the numbers for finite strain changed neither states nor tangents of sixteen slides.
     """
 
-    hertz_overlap: float = 0.5  # by depth, from which skin is guessed to touch: in Hertz' contact half does
+    hertz_overlap: float = (
+        0.5  # relative to the depth, from which skin is guessed to touch: in Hertz' contact half does
+    )
     max_hertz_systems: int = 12  # for that guess
-    overlaps: tuple[float, ...] = (0.3, 0.6, 0.1, 0.9, 0.03, 0.01)  # by the depth, tried in turn
+    overlaps: tuple[float, ...] = (0.3, 0.6, 0.1, 0.9, 0.03, 0.01)  # relative to the depth, tried in turn
     intermediate_tolerance: float = 1e-4  # tolerance of steps before the last [-]; looser ones diverge near nu = 0.5
     max_tangents: int = 160  # then no more steps are halved: 80 lose deep presses, 320 gain none
     min_step: float = 1.0 / 64.0  # by the path

@@ -275,7 +275,9 @@ class Lines:
     """Positions of the lines between a finger's elements, in the order of nodes: proximal to distal, and outwards."""
 
     arcs: tuple[float, ...]  # arc positions of the lines across the tissue [mm]
-    bone: tuple[float, ...]  # of those along it in a meshed bone: radii from the core to 1, by the bone's; else none
+    bone: tuple[
+        float, ...
+    ]  # of those along it in a meshed bone: radii from the core to 1, relative to the bone's; else none
     fat: tuple[float, ...]  # heights in the fat, from 0 on the bone to 1
     skin: tuple[float, ...]  # depths in the skin, the outermost last [mm]
 

@@ -117,14 +117,14 @@ class Outline:
 
 
 EPIDERMIS, DERMIS, FAT, BONE = 0, 1, 2, 3  # numbers of the regions
-CORE = 1.0 / 3.0  # radius of a meshed bone's driven core, by the bone's [-]
+CORE = 1.0 / 3.0  # radius of a meshed bone's driven core, relative to the bone's [-]
 FOLD = (0.015, 0.1)  # element size where the skin folds: the smaller part, of the tip radius or of the epidermis
-FINEST = 1e-3  # smallest element by tip radius: round-off swamps thinner ones across the whole finger [-]
+FINEST = 1e-3  # smallest element relative to the tip radius: round-off swamps thinner ones across the whole finger [-]
 
 
 @dataclass(frozen=True, slots=True)
 class ElementSizes:
-    """Sizes of elements, by tip radius over fineness; chosen on random scenes at finite strain."""
+    """Sizes of elements, relative to tip radius over fineness; chosen on random scenes at finite strain."""
 
     in_contact: float = 0.5  # along the skin that may touch
     palmar_growth: float = 1.0  # outside the contact: skin behind it is compressed, and may fold
@@ -132,19 +132,19 @@ class ElementSizes:
     aspect: float = 1.7  # across the skin at the surface, by the size along it
     bulk: float = 1.5  # across the tissue, at most
     at_bone: float = 0.45  # across the tissue at the bone, where fat is sheared most
-    from_bone: float = 6.0  # growth from the bone, by tip radius
+    from_bone: float = 6.0  # growth from the bone, relative to the tip radius
     at_ending: float = 0.7  # across the tissue at the ending
     from_ending: float = 3.0  # likewise
-    point_across: float = 0.02  # endings smaller across the skin, by tip radius, count as points
+    point_across: float = 0.02  # endings smaller across the skin, relative to the tip radius, count as points
     point_along: float = 0.1  # likewise along it
     at_point: float = 0.1  # size of the element around a point
     from_point: float = 0.5  # growth from that element [-]
     growth: float = 0.2  # growth of elements at the surface with the depth below it [-]
-    short_overlap: float = 0.56  # half overlaps shorter than this, by tip radius, have smaller elements
+    short_overlap: float = 0.56  # half overlaps shorter than this, relative to the tip radius, have smaller elements
     fold_elements: float = 4.0  # number of elements of that size to each side of a fold
     from_fold: float = 0.5  # growth from these [-]
     fold_aspect: float = 2.0 / 3.0  # across the skin at a fold, by the size along it
-    held_distance: float = 0.1  # skin closer to held skin is compressed without bound, by tip radius
+    held_distance: float = 0.1  # skin closer to held skin is compressed without bound, relative to the tip radius
 
 
 _SIZES = ElementSizes()

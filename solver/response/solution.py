@@ -32,7 +32,7 @@ TOLERANCE_MISSED = "The finest mesh leaves an error estimate above the tolerance
 # Of a mesh on which a scene without a state on the first is solved once more: 8 refuses the same of 316 scenes.
 LIMIT_FINENESS = 6.0
 FINENESS_RATIO = 1.2  # to the next mesh that is tried where one mesh may have no state by chance
-ASSUMED_ERROR = 4.0  # by the tolerance, where nothing is known of the error
+ASSUMED_ERROR = 4.0  # relative to the tolerance, where nothing is known of the error
 MESHINGS: dict[str, type[Meshing]] = {"small": SmallMeshing, "finite": FiniteMeshing}  # by kinematics
 Rough = Callable[[Prediction], None]  # called with each answer that is to be refined, to be kept if work stops
 
@@ -357,7 +357,7 @@ def _errors(
 
 
 def _error_by_tolerance(answer: Answer, *, on_first: bool) -> float:
-    """Return an answer's error estimate by the tolerance of its scene, `ASSUMED_ERROR` where it is not known.
+    """Return an answer's error estimate relative to the tolerance of its scene, `ASSUMED_ERROR` where it is not known.
 
     A failure `on_first`, the first mesh, counts as unknown: a finer one may have a state. Where the free cut folds,
     the error is unknown on finer meshes too, and counts as 0.

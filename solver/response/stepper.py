@@ -144,14 +144,16 @@ class SmallStepper(Stepper):
 class StepperControl:
     """Iterations for a reading at finite strain, and criteria for a valid state and for a lost one."""
 
-    max_force_error: float = 0.02  # of a valid state, by the normal force
+    max_force_error: float = 0.02  # of a valid state, relative to the normal force
     retry_ratio: float = (
         0.7  # ratio of the normal force to that of the last failure at which a lost state is tried again
     )
     restart_steps: int = 12  # load steps from the undeformed finger to the forces of a reading
     restart_iterations: int = 3  # iterations for each of these
     max_catch_up_iterations: int = 8  # for the last of these, and after an invalid state
-    catch_up_step: float = 1e-3  # displacement in an iteration that ends those, by the length scale of the body
+    catch_up_step: float = (
+        1e-3  # displacement in an iteration that ends those, relative to the length scale of the body
+    )
     min_stretch: float = 0.65  # of valid skin: it folds at 0.544, later on a coarse mesh
     max_kink: float = 0.3  # of valid skin: a coarse mesh has this where skin folds
     large_step: float = 0.01  # displacement in an iteration after which another follows, likewise
@@ -276,7 +278,7 @@ _FINENESS = {"small": 4.0, "finite": 2.7}  # meshes on which the response is goo
 MARGIN = {
     "small": 4.0,
     "finite": 6.0,
-}  # by the indentation: height of undeformed skin up to which contact is considered
+}  # relative to the indentation: height of undeformed skin up to which contact is considered
 # A nine-node element as four quadrilaterals, and the local coordinates of their midpoints.
 QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
 MIDPOINTS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])

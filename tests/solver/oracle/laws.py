@@ -3,8 +3,7 @@
 
 import numpy as np
 
-from solver.arrays import NEO_HOOKEAN, Array
-from solver.constitutive import shape, stress_parts
+from solver.arrays import Array
 from solver.contact import SHEAR_LIMITED, SLIP
 
 
@@ -20,21 +19,28 @@ def energy(law, F):
     """Return W (...) [MPa] of a law of finite strain at deformation gradients F (..., 2, 2); nan where det F <= 0."""
     J = F[..., 0, 0] * F[..., 1, 1] - F[..., 0, 1] * F[..., 1, 0]
     Q = np.sum(F * F, axis=(-2, -1)) - 2.0 - 2.0 * np.log(J)
-    stretch_energy = Q if law.stiffening == NEO_HOOKEAN else shape(np.array(law.stiffening), Q)
-    return law.shear / 2.0 * stretch_energy + law.lame / 2.0 * np.log(J) ** 2
+    stretch = np.exp(np.arccosh(1.0 + np.maximum(Q, 0.0) / 2.0) / 2.0)  # the larger one, the other being its inverse
+    power = stretch**law.stiffening
+    return 2.0 * law.shear / law.stiffening**2 * (power + 1.0 / power - 2.0) + law.lame / 2.0 * np.log(J) ** 2
 
 
 def overstress_energy(T: Array, F: Array) -> Array:
     """Return 1/2 J^-2/3 T:C (...) [MPa], of which `overstress` is the derivative within a step."""
-    J, _, _, contraction = stress_parts(F, T)
-    return 0.5 * J ** (-2.0 / 3.0) * contraction
+    return 0.5 * np.linalg.det(F) ** (-2.0 / 3.0) * _contraction(T, F)
+
+
+def _contraction(T: Array, F: Array) -> Array:
+    """Return T:C (...), with C_zz = 1."""
+    C = np.swapaxes(F, -1, -2) @ F
+    return T[..., 0] * C[..., 0, 0] + T[..., 1] * C[..., 1, 1] + 2.0 * T[..., 2] * C[..., 0, 1] + T[..., 3]
 
 
 def overstress_tangent(T: Array, F: Array) -> Array:
     """Return dP_aA/dF_bB (..., a, A, b, B) [MPa] within a step."""
-    J, inverse, product, contraction = stress_parts(F, T)
+    J, inverse, contraction = np.linalg.det(F), np.swapaxes(np.linalg.inv(F), -1, -2), _contraction(T, F)
     expanded = (..., None, None, None, None)
     plane = np.stack([T[..., [0, 2]], T[..., [2, 1]]], axis=-2)
+    product = F @ plane
     outer = np.einsum("...aA,...bB->...aAbB", product, inverse)
     tangent = np.einsum("ab,...AB->...aAbB", np.eye(2), plane)
     tangent = tangent - 2.0 / 3.0 * (outer + np.einsum("...aA,...bB->...aAbB", inverse, product))
