@@ -1,4 +1,4 @@
-"""What the page of a new session asks for, and what is wrong with it: a sentence for each field. No Qt."""
+"""The form of a new session, and its check, with a sentence for each wrong field. No Qt."""
 
 import os
 import re
@@ -23,17 +23,17 @@ from sessions.recording.storage import check_room
 from sessions.run.resuming import check_resumable
 from sessions.toml_file import SettingsError
 
-PILOT, PILOTS = "PILOT", "pilots"  # code of the simulated subject, and folder below that of the sessions
+PILOT, PILOTS = "PILOT", "pilots"  # code of the simulated subject, and subfolder of the sessions' folder
 _NUMBERS = {
     "height": tr_noop("A height is a number of millimetres from −{highest:.0f} to {highest:.0f}, or left empty."),
     "area": tr_noop("An area is a number of mm² from {least:.0f} to {most:.0f}, or left empty."),
 }
-_LONGEST_LIST = 20  # sessions that were cut short, at most
+_LONGEST_LIST = 20  # most unfinished sessions listed
 
 
 @dataclass(frozen=True, slots=True)
 class SessionForm:
-    """What stands on the page; everything as it was typed."""
+    """The entries of the page, as typed."""
 
     subject: str = ""
     protocol: str = "sensotact-friction"
@@ -43,19 +43,19 @@ class SessionForm:
     stroking_hand: Hand | None = None
     answering_hand: Hand | None = None
     forces: bool = True
-    height: str = ""  # of the stimulus's face above the transducer's origin [mm]; empty: as bench or protocol state it
-    normal: str = ""  # axis along which pressing is positive, one of AXES; empty: likewise
-    area: str = ""  # of finger and surface [mm2], for tau_max; empty: likewise
-    pre_evaluation: bool = False  # every stimulus judged once before all else
+    height: str = ""  # of the stimulus's face above the transducer's origin [mm]; empty: from bench or protocol
+    normal: str = ""  # axis along which pressing is positive, one of AXES; empty: from bench or protocol
+    area: str = ""  # of finger and surface [mm2], for tau_max; empty: from the protocol
+    pre_evaluation: bool = False  # every stimulus judged once before everything else
     practice: bool = False  # before the trials that count
-    language: str = ""  # that the subject reads, its code; empty: the protocol's own
-    simulated: bool = False  # the subject's judgement too, where the bench is simulated
-    tablet: str = ""  # why the subject's page is on no tablet, where it should be
-    pilot: bool = False  # kept apart from what people do, in no study
+    language: str = ""  # code of the subject's language; empty: the protocol's own
+    simulated: bool = False  # simulate the subject's judgement too, on a simulated bench
+    tablet: str = ""  # why the subject's page is not on a tablet, if it should be
+    pilot: bool = False  # kept apart from real sessions, in no study
 
     @property
     def root_folder(self) -> Path:
-        """Return the folder that it names; as it was typed where it begins with the home of nobody."""
+        """Return the folder named; as typed if it begins with an unknown user's home."""
         folder = Path(self.folder.strip() or ".")
         try:
             return folder.expanduser()
@@ -64,53 +64,53 @@ class SessionForm:
 
     @property
     def parent_folder(self) -> Path:
-        """Return the folder in which the session gets its own."""
+        """Return the folder in which the session's folder is created."""
         return self.root_folder / self.study.strip()
 
 
 class Refusal(dict[str, str]):
-    """Why no session can begin: a sentence for each field that is wrong, by its name."""
+    """Why no session can begin: a sentence for each wrong field, by its name."""
 
 
 @dataclass(frozen=True, slots=True)
 class Bench:
-    """What the page needs to know of the bench."""
+    """The bench's properties that matter to the form."""
 
     connected: bool = False
     simulated: bool = False
     frame: Frame | None = None
-    rate: float = float("nan")  # readings a second as set [Hz]; nan where unknown
+    rate: float = float("nan")  # readings a second as set [Hz]; nan if unknown
 
 
 @dataclass(frozen=True, slots=True)
 class Enrolment:
-    """What the study that a form names says of its subject."""
+    """The enrolment of a form's subject in its study."""
 
-    protocol: str  # the study's own, which holds for all its sessions
+    protocol: str  # the study's own, which applies to all its sessions
     sentence: str
-    may_enrol: bool = False  # the subject is a code that nobody in the study has borne
+    may_enrol: bool = False  # the subject's code was never used in the study
     enrolled: bool = False  # the subject's session can begin
 
 
 @dataclass(frozen=True, slots=True)
 class UnfinishedSession:
-    """A session that was cut short and can go on."""
+    """A session that was cut short and can be resumed."""
 
     folder: Path
     description: str
 
 
 def bench_of(bench: BenchState) -> Bench:
-    """Return what the page needs to know of the bench that the window shows."""
+    """Return the form's view of the bench that the window shows."""
     simulated = bench.info is not None and bench.info.simulated and bench.frame is not None
     rate = float("nan") if bench.info is None else bench.info.rate
     return Bench(bench.link == "open", simulated, bench.frame, rate)
 
 
 def pilot_form(form: SessionForm, bench: Bench) -> SessionForm:
-    """Return the form that pilots the protocol of a form, or of its study: nobody is named and nobody is needed.
+    """Return the form of a pilot of a form's or its study's protocol, which needs no subject.
 
-    A connected simulated bench is stroked; else scores alone are piloted, for no simulated hand strokes a real one.
+    A pilot uses a connected simulated bench, else records scores only: no simulated hand strokes a real bench.
     """
     forces = form.forces and bench.simulated
     return replace(form, subject=PILOT, forces=forces, height="", normal="", area="", simulated=True, pilot=True)
@@ -119,10 +119,10 @@ def pilot_form(form: SessionForm, bench: Bench) -> SessionForm:
 def check_form(
     form: SessionForm, bench: Bench, now: datetime, new_seed: int, settings: tuple[Setting, ...] = ()
 ) -> StartSession | Refusal:
-    """Return the request that begins the session, or what is wrong with the form.
+    """Return the request that begins the session, or the errors of the form.
 
-    `new_seed` is used where the form names none; `settings` are kept with the session beside the page's own. In a
-    study, protocol, seed and the subject's own finger are those that were decided at its enrolment.
+    `new_seed` is used if the form names none; `settings` are kept with the session in addition to the page's. In a
+    study, protocol, seed and the subject's own finger are those of the enrolment.
     """
     if wrong := _refusals(form, bench):
         return wrong
@@ -154,7 +154,7 @@ def check_form(
 
 
 def refusals(form: SessionForm, bench: Bench, record: Enrolment | None) -> Refusal:
-    """Return everything that keeps a session from beginning; `record` is the form's enrolment."""
+    """Return everything that prevents a session from beginning; `record` is the form's enrolment."""
     wrong = _refusals(form, bench)
     if form.tablet and not form.simulated:
         wrong["tablet"] = form.tablet
@@ -178,7 +178,7 @@ def refusals(form: SessionForm, bench: Bench, record: Enrolment | None) -> Refus
 
 
 def optional_phases(form: SessionForm) -> tuple[Phase, ...]:
-    """Return the phases that may precede the main trials in the protocol of the study, or else of the form."""
+    """Return the phases that may precede the main trials in the protocol of the study, or of the form without one."""
     try:
         return phases_before(_protocol(form))
     except (StudyError, SettingsError, OSError):
@@ -186,7 +186,7 @@ def optional_phases(form: SessionForm) -> tuple[Phase, ...]:
 
 
 def subject_texts(form: SessionForm) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the languages that the form's protocol has, its own first, and what of it is read in the form's."""
+    """Return the languages of the form's protocol, its own first, and its texts in the form's language."""
     try:
         original = _protocol(form)
         version = original.in_language(form.language) if form.language in original.languages else original
@@ -197,7 +197,7 @@ def subject_texts(form: SessionForm) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def enrolment(form: SessionForm) -> Enrolment | None:
-    """Return what the study that the form names says of the subject; None where it names none that was made."""
+    """Return the subject's enrolment in the form's study; None if the form names no existing study."""
     try:
         study = _study(form)
     except (StudyError, SettingsError, OSError) as error:
@@ -223,7 +223,7 @@ def enrolment(form: SessionForm) -> Enrolment | None:
 
 
 def enrol_subject(form: SessionForm) -> str:
-    """Enrol the form's subject in its study, without measures of its finger; return why it failed, or ""."""
+    """Enrol the form's subject in its study, without measurements of the finger; return why it failed, or ""."""
     try:
         enrol(form.parent_folder, form.subject.strip(), Body())
     except (StudyError, SettingsError, OSError) as error:
@@ -232,7 +232,7 @@ def enrol_subject(form: SessionForm) -> str:
 
 
 def _choose_protocol(form: SessionForm, new_seed: int) -> tuple[Protocol, int, Body | None, StudyPlace | None]:
-    """Return protocol, seed, the subject's finger and its place, from the study if there is one, else the form."""
+    """Return protocol, seed, the subject's finger and study place, from the study if there is one, else the form."""
     study = _study(form)
     if study is None:
         return protocol(form.protocol), int(form.seed) if form.seed.strip() else new_seed, None, None
@@ -242,22 +242,22 @@ def _choose_protocol(form: SessionForm, new_seed: int) -> tuple[Protocol, int, B
 
 
 def _study(form: SessionForm) -> Study | None:
-    """Return the study that a form names; None where it names none that was made."""
+    """Return the study that a form names; None if there is no such study."""
     folder = form.parent_folder
     return open_study(folder) if form.study.strip() and is_study(folder) else None
 
 
 def _protocol(form: SessionForm) -> Protocol:
-    """Return the protocol of the study that a form names, or else its own."""
+    """Return the protocol of the form's study, or without a study its own."""
     study = _study(form)
     return protocol(form.protocol) if study is None else study.protocol
 
 
 def unfinished_sessions(folder: Path) -> tuple[UnfinishedSession, ...]:
-    """Return the sessions below a folder (or a study in it) that were cut short and can go on, the newest first."""
+    """Return the resumable sessions below a folder or a study in it, the newest first."""
     unfinished: list[UnfinishedSession] = []
     modified: dict[Path, float] = {}
-    with suppress(OSError):  # a folder that cannot be read, or that goes meanwhile
+    with suppress(OSError):  # a folder that is unreadable or disappears
         for file in (*folder.glob("*/session.sqlite"), *folder.glob("*/*/session.sqlite")):
             modified[file] = file.stat().st_mtime
     for file in sorted(modified, key=lambda file: -modified[file]):
@@ -282,7 +282,7 @@ def unfinished_sessions(folder: Path) -> tuple[UnfinishedSession, ...]:
 
 
 def _local_time(stamp: object) -> str:
-    """Return day and time of this computer's zone; a dash where nothing readable is recorded.
+    """Return date and time in this computer's zone; a dash for an unreadable stamp.
 
     >>> _local_time("2026-11-26T19:51:33"), _local_time(None)
     ('2026-11-26 19:51', '–')
@@ -318,7 +318,7 @@ def _refusals(form: SessionForm, bench: Bench) -> Refusal:
 
 
 def _why_unusable(folder: Path) -> str:
-    """Return why no session can be kept below a folder, "" where it can."""
+    """Return why no session can be kept below a folder, or ""."""
     try:
         nearest = next((path for path in (folder, *folder.parents) if path.exists()), folder)
         if not nearest.is_dir():
@@ -331,7 +331,7 @@ def _why_unusable(folder: Path) -> str:
 
 
 def _number(text: str) -> float | None:
-    """Return a number as it was typed, a comma for a point too; None where it is none, or may be either of two."""
+    """Return a typed number, with a decimal point or comma; None if it is not a number or ambiguous."""
     size = typed_number(_without_sign(text))
     return -size if size is not None and text.strip().startswith(("-", "−")) else size
 
@@ -341,7 +341,7 @@ def _without_sign(text: str) -> str:
 
 
 def _doubt(text: str) -> str:
-    """Return what to type in place of a number whose comma may group thousands, "" for any other."""
+    """Return advice for a number whose comma may group thousands, "" for any other."""
     meanings = two_meanings(_without_sign(text))
     return "" if meanings is None else tr(" Type {whole} or {fraction}.", whole=meanings[0], fraction=meanings[1])
 

@@ -1,4 +1,4 @@
-"""What the window knows: one frozen state, and how each message changes it. No Qt, no clock, no file."""
+"""The window's state, one frozen dataclass, and its changes by each message. No Qt, no clock, no file."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
@@ -28,38 +28,38 @@ class Tick(Struct, frozen=True):
 
 
 class Searching(Struct, frozen=True):
-    """Devices are being looked for."""
+    """A search for devices is running."""
 
 
 class DevicesFound(Struct, frozen=True):
-    """What answered when devices were looked for."""
+    """The result of a search for devices."""
 
     devices: tuple[Probe, ...]
 
 
 class LifeKnown(Struct, frozen=True):
-    """What a serial number has been through was looked up."""
+    """The history of a serial number was read."""
 
     serial: str
     life: Life | None
 
 
 class Dismissed(Struct, frozen=True):
-    """The experimenter has read the sentence of a failure."""
+    """The experimenter has dismissed the message of a failure."""
 
 
 class NewSession(Struct, frozen=True):
-    """The experimenter leaves a session that has ended, for the page where the next is begun."""
+    """The experimenter leaves an ended session for the page of a new one."""
 
 
 class DrawingFailed(Struct, frozen=True):
-    """A picture could not be drawn; the recording is not touched by it."""
+    """A picture could not be drawn; the recording is not affected."""
 
     sentence: str
 
 
 class LanguageChosen(Struct, frozen=True):
-    """The language that the next session's subject reads was chosen."""
+    """The subject's language for the next session was chosen."""
 
     language: str
 
@@ -67,14 +67,14 @@ class LanguageChosen(Struct, frozen=True):
 Own = (
     Tick | Searching | DevicesFound | LifeKnown | Judged | Dismissed | NewSession | DrawingFailed | LanguageChosen
 )  # fmt: skip
-Message = m.Request | m.Report | Own  # what `fold` takes
+Message = m.Request | m.Report | Own  # messages of `fold`
 
 
 @dataclass(frozen=True, slots=True)
 class Zero:
     """A measured zero of the bench."""
 
-    mean: m.Six  # in force, nothing subtracted [N, N mm]
+    mean: m.Six  # as a load, nothing subtracted [N, N mm]
     noise: m.Six  # standard deviation [N, N mm]
     readings: int
     duration: float  # [s]
@@ -82,26 +82,26 @@ class Zero:
 
 @dataclass(frozen=True, slots=True)
 class BenchState:
-    """The transducer, and whether to trust it."""
+    """The transducer and its health."""
 
     link: Link = "none"
     uri: str = ""
     info: TransducerInfo | None = None
-    frame: Frame | None = None  # of a bench that knows it
-    problem: str | None = None  # why the link is lost, or was not made
+    frame: Frame | None = None  # of a simulated or recorded bench
+    problem: str | None = None  # why the link is lost or failed
     searching: bool = False
-    searched: bool = False  # a search has ended since somebody connected or let go
+    searched: bool = False  # a search has ended since the last connecting or disconnecting
     devices: tuple[Probe, ...] = ()
     health: Health = field(default_factory=Health)
     rate: float = float("nan")  # measured [Hz]
     load: Load = field(default_factory=Load)
-    peak: Load = field(default_factory=Load)  # since somebody acknowledged it
-    saturated: int = 0  # since somebody acknowledged it
+    peak: Load = field(default_factory=Load)  # since it was acknowledged
+    saturated: int = 0  # since it was acknowledged
     silence: float = 0.0  # since the newest reading [s]
     taring: bool = False
     zero: Zero | None = None  # the latest
     first_zero: Zero | None = None  # the first since the bench was connected
-    life: Life | None = None  # of its serial number, where anything is kept of it
+    life: Life | None = None  # of its serial number, if it has a history
 
 
 def _fold_link(bench: BenchState, message: Message) -> BenchState:
@@ -124,7 +124,7 @@ def _fold_link(bench: BenchState, message: Message) -> BenchState:
         case m.SessionEnded(end=end) if end.cause == "device":
             return replace(bench, link="lost", problem=end.reason)
         case m.Gone(requested=False):
-            return BenchState(devices=bench.devices)  # the recorder's process held the transducer
+            return BenchState(devices=bench.devices)  # the transducer is gone with the recorder's process
         case _:
             return bench
 
@@ -160,7 +160,7 @@ def _set_zero(bench: BenchState, mean: Any, spread: Any, readings: int, duration
         return bench
     matrix = bench.info.calibration.matrix
     force = tuple((matrix @ np.asarray(mean, float)).tolist())
-    # Noise of the axes is taken as independent in raw units: exact where the box has combined the gauges itself.
+    # Noise of the axes is assumed independent in raw units: exact if the box itself combines the gauges.
     noise = tuple(np.sqrt(matrix**2 @ np.asarray(spread, float) ** 2).tolist())
     zero = Zero(force, noise, readings, duration)  # type: ignore[arg-type]  # six of each, as `matrix` has rows
     return replace(bench, zero=zero, first_zero=bench.first_zero or zero)
@@ -168,20 +168,20 @@ def _set_zero(bench: BenchState, mean: Any, spread: Any, readings: int, duration
 
 @dataclass(frozen=True, slots=True)
 class AppState:
-    """Everything the window knows."""
+    """The whole state of the window."""
 
     now: float = 0.0  # [s] of the machine's monotonic clock
-    last_report: float | None = None  # when the recorder was last heard [s]
+    last_report: float | None = None  # time of the recorder's last report [s]
     bench: BenchState = field(default_factory=BenchState)
     session: SessionState | None = None
-    failure: m.Failed | None = None  # the last request that could not be met
-    exit_reason: str | None = None  # why the recorder's process is not there any more
-    drawing_error: str | None = None  # what could not be drawn
-    language: str = ENGLISH  # that the next session's subject reads, as it is chosen
+    failure: m.Failed | None = None  # the last failed request
+    exit_reason: str | None = None  # why the recorder's process has ended
+    drawing_error: str | None = None  # of a picture
+    language: str = ENGLISH  # of the next session's subject, as chosen
 
 
 def fold(state: AppState, message: Message) -> AppState:
-    """Return the state after a message: what was sent to the recorder, what came from it, or the window's own."""
+    """Return the state after a message: a request to the recorder, a report from it, or the window's own."""
     if type(message) in _FROM_RECORDER:
         state = replace(state, last_report=state.now)
     bench = _fold_readings(_fold_link(state.bench, message), message)

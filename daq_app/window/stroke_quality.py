@@ -1,4 +1,4 @@
-"""How good the last stroke was, said while its stimulus is mounted: the analysis of a take, in its own process."""
+"""Quality of the last stroke while its stimulus is still mounted: the analysis of a take, in a separate process."""
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -26,11 +26,11 @@ from sessions.strokes.stroke import Stroke
 from sessions.strokes.trial_analysis import TrialContext
 
 KEEP_OFF = tr_noop("Keep the finger off until the stroke.")
-AFTER = 0.35  # unloaded readings after a lift that belong to the picture of a stroke [s]
-FELL = 0.5  # a normal force that falls by this share along the steady window is worth a word [-]
+AFTER = 0.35  # unloaded readings after a lift that belong to a stroke [s]
+FELL = 0.5  # relative fall of the normal force over the steady window above which it is reported [-]
 
-# Few words for what an experimenter can do something about, and what to do, as a command to whoever runs the session.
-# The other flaws show their own sentence. Where there is no command, the advice is another stroke.
+# Short texts of flaws that an experimenter can correct, and the correction as an imperative.
+# Other flaws show their own sentence. Where there is no correction, the advice is another stroke.
 _FLAWS: Mapping[FlawName, tuple[str, str]] = {
     FlawName.NO_STROKE: tr_noop(("no stroke was found", "Stroke once, firmly, and lift.")),
     FlawName.NO_STEADY_SLIDING: tr_noop(("no steady window", "Slide further, at one speed.")),
@@ -55,7 +55,7 @@ PRESS_ON = tr_noop("Keep pressing until the end.")
 
 
 def stroke_quality(block: ReadingBlock, plan: SessionPlan, info: TransducerInfo, trial: Trial) -> Quality:
-    """Return the quality of the stroke in the readings of one take, judged as the analysis of a recording judges it."""
+    """Return the quality of the stroke in the readings of one take, by the same analysis as for a recording."""
     analysis = analyse_blocks([(trial, block)], TrialContext(plan, info, AnalysisSettings()))
     stroke = analysis.strokes[0] if analysis.strokes else None
     flaws = sorted(analysis.flaws, key=lambda flaw: ("refused", "doubtful", "note").index(flaw.grade))
@@ -76,12 +76,12 @@ def stroke_quality(block: ReadingBlock, plan: SessionPlan, info: TransducerInfo,
 
 
 def live_quality(block: ReadingBlock, plan: SessionPlan, info: TransducerInfo, trial: Trial, take: int) -> Judged:
-    """Return the quality of the stroke in hand."""
+    """Return the quality of the current stroke."""
     return Judged(trial.number, take, stroke_quality(block, plan, info, trial))
 
 
 def recorded_quality(folder: str, number: int) -> Judged | None:
-    """Return the quality of a trial's stroke from before an interruption; None where no take of it counts."""
+    """Return the quality of a trial's stroke from before an interruption; None if none of its takes counts."""
     recording = Recording.open(Path(folder))
     record = recording.trial(number)
     if recording.info is None or record.take is None:
@@ -91,14 +91,14 @@ def recorded_quality(folder: str, number: int) -> Judged | None:
 
 
 def in_newtons(info: TransducerInfo) -> TransducerInfo:
-    """Return the transducer as if it gave its wrench: for readings that were already made newtons."""
+    """Return the info of a transducer whose raw numbers are wrenches, for readings already in newtons."""
     calibration = info.calibration
     as_wrench = Calibration(calibration.serial, "N, N mm", np.eye(6), calibration.rated, calibration.source)
     return replace(info, calibration=as_wrench)
 
 
 def _fell(stroke: Stroke) -> float | None:
-    """Return by what share N fell from the first to the last quarter of the steady window; None without one."""
+    """Return the relative fall of N from the first to the last quarter of the steady window; None without one."""
     if stroke.steady is None or stroke.curve is None:
         return None
     inside = (stroke.curve.time >= stroke.steady[0]) & (stroke.curve.time <= stroke.steady[1])
@@ -111,30 +111,30 @@ def _fell(stroke: Stroke) -> float | None:
 
 
 class Judge:
-    """Watches the takes that pass, and says of each stroke how good it was."""
+    """Follows the takes, and reports the quality of each stroke."""
 
     def __init__(self, send: Callable[[Judged | DrawingFailed], None]) -> None:
-        """Tell by `send`, from another thread."""
+        """Report through `send`, from another thread."""
         self._send = send
         self._worker: ProcessPoolExecutor | None = None
-        self._take: tuple[int, int] | None = None  # trial and take in hand
-        self._offset = 0.0  # of the times in the log to those of the stream [s]
-        self._due: float | None = None  # when the take is to be looked at [s, device time]
+        self._take: tuple[int, int] | None = None  # current trial and take
+        self._offset = 0.0  # from the times in the log to those of the stream [s]
+        self._due: float | None = None  # when the take is to be judged [s, device time]
 
     def prepare(self) -> ProcessPoolExecutor:
-        """Start the process, so that the first stroke need not wait for it, and return it."""
+        """Start the process before the first stroke needs it, and return it."""
         if self._worker is None:
             self._worker = process_pool(1)
             self._worker.submit(_stand_by)
         return self._worker
 
     def close(self) -> None:
-        """End the process, and wait for its end: a Python that leaves meanwhile may write to a pipe that is closed."""
+        """End the process and wait for it: an interpreter that exits earlier may write to a closed pipe."""
         if self._worker is not None:
             self._worker.shutdown(cancel_futures=True)
 
     def follow(self, report: m.Report, feed: LiveFeed) -> None:
-        """Follow the course: a take begins, the finger lifts."""
+        """Follow the session: a take begins, the finger lifts."""
         match report:
             case steps.StartTake(trial, take):
                 self._take, self._due = (trial, take), None
@@ -151,7 +151,7 @@ class Judge:
                 self._due = None
 
     def look(self, feed: LiveFeed, state: AppState) -> None:
-        """Have the take looked at once enough came after the lift."""
+        """Have the take judged once enough readings have arrived after the lift."""
         newest, session, info = feed.trace.newest, state.session, state.bench.info
         if self._due is None or newest is None or newest < self._due:
             return
@@ -166,10 +166,10 @@ class Judge:
         self._submit(live_quality, block, session.plan, in_newtons(info), trial.trial, take)
 
     def _submit(self, work: Callable[..., Judged | None], *arguments: object) -> None:
-        """Have the process do a work, and tell what comes of it."""
+        """Run work in the process, and report its result."""
         try:
             future = self.prepare().submit(work, *arguments)
-        except BrokenProcessPool:  # it ended while it had nothing to do
+        except BrokenProcessPool:  # it ended while idle
             self._worker = None
             future = self.prepare().submit(work, *arguments)
         future.add_done_callback(self._report_quality)
@@ -178,7 +178,7 @@ class Judge:
         if answer.cancelled():
             return
         if error := answer.exception():
-            self._worker = None  # the next stroke gets another
+            self._worker = None  # the next stroke starts another
             name = type(error).__name__
             self._send(DrawingFailed(tr("a stroke was not looked at: {name} {error}", name=name, error=error)))
         elif (judgement := answer.result()) is not None:
@@ -186,5 +186,5 @@ class Judge:
 
 
 def _stand_by() -> None:
-    """Go behind window and recorder; to be asked so, this process has loaded the analysis."""
+    """Lower the process's priority; unpickling this function has loaded the analysis."""
     give_way()

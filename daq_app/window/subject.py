@@ -1,4 +1,4 @@
-"""The subject: texts and pages, all pages before there is a session, an answer as it is given, and whose a key is."""
+"""The subject's side: texts and pages, the preview, the answer being given, and the owner of a key."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -16,19 +16,19 @@ from sessions.plan.protocols.protocol import ENGLISH
 from sessions.run import machine, states, steps
 from sessions.run.steps import MagnitudeEstimate, PairedChoice, Scored
 
-Translate = Callable[[str], str]  # an English text -> that in the subject's language
+Translate = Callable[[str], str]  # English text -> text in the subject's language
 Kind = Literal["read", "line", "number", "choice"]
 Device = Literal["mouse", "touch", "pen", "keyboard"]
 Which = Literal["first", "second"]
 Owner = Literal["text", "answer", "course"]
 
-# Of a preview: answers, events, and what its pages are called.
+# Of a preview: answers, events, and names of its pages.
 EXAMPLES = {"number": steps.MagnitudeEstimate(1.0), "choice": steps.PairedChoice("first")}
-_ALWAYS: Mapping[type, steps.Event] = {  # what brings a session on from a state, whatever the trial
+_ALWAYS: Mapping[type, steps.Event] = {  # event that advances a session from a state, for any trial
     states.Idle: steps.Begin(), states.Taring: steps.Zeroed(), states.Stroking: steps.FingerLifted(),
     states.Settling: steps.FingerLifted(), states.Resting: steps.RestOver(),
 }  # fmt: skip
-OF_A_BLOCK = {"ready": tr_noop("stroke"), "scoring": tr_noop("answer")}  # phases whose page is the block's own
+OF_A_BLOCK = {"ready": tr_noop("stroke"), "scoring": tr_noop("answer")}  # phases whose page differs between blocks
 _NAMES = {
     "mounting": tr_noop("the surface is changed"), "settling": tr_noop("the finger is still on"),
     "resting": tr_noop("rest"), "paused": tr_noop("pause"), "closing": tr_noop("end"),
@@ -36,22 +36,22 @@ _NAMES = {
 
 # Of an answer on the line, and of keys:
 LENGTH = 100.0  # of the line [mm]
-_MIDDLE = 50.0  # where the first key press puts the mark, whichever key it is
-STEP = 1.0  # by which an arrow moves the mark ...
-LEAP = 10.0  # ... and Page Up or Page Down
-PAUSE = 1.0  # key presses further apart than this are two answers, not one [s]
-DIGITS = 1  # of a score: a mark can be placed no finer
-GIVES = frozenset({"Enter", "Space"})  # the answer that stands
+_MIDDLE = 50.0  # position of the mark after the first press of any key
+STEP = 1.0  # of the mark by an arrow key ...
+LEAP = 10.0  # ... and by Page Up or Page Down
+PAUSE = 1.0  # key presses further apart count as two answers [s]
+DIGITS = 1  # of a score: the resolution of the mark
+GIVES = frozenset({"Enter", "Space"})  # the present answer
 _PLACES = frozenset({"Left", "Right", "Up", "Down", "PgUp", "PgDown", "Home", "End"})  # the mark on the line
 TYPES = frozenset({*"0123456789.,", "Backspace", "Del"})  # a number
-CHOOSES = frozenset({"0", "1", "2", "Left", "Right"})  # one of two; 0, beside them on a keypad, does nothing
+CHOOSES = frozenset({"0", "1", "2", "Left", "Right"})  # one of two; 0, next to them on a keypad, does nothing
 ANSWER_KEYS: dict[Kind, frozenset[str]] = {
     "read": frozenset(), "line": _PLACES | GIVES, "number": TYPES | GIVES, "choice": CHOOSES | GIVES,
 }  # fmt: skip
 
 
 class SubjectText(StrEnum):
-    """Every text of the subject's page that no protocol gives. Words in braces are put in."""
+    """The texts of the subject's page that do not come from a protocol. Words in braces are replaced."""
 
     WELCOME = "Welcome"
     BEGINS = "The experimenter will begin in a moment."
@@ -86,7 +86,7 @@ class SubjectText(StrEnum):
     PRESSING = "How hard you press"
 
 
-_PLAIN = {  # title and text of the pages on which nothing is to be done
+_PLAIN = {  # title and text of the pages without a task
     "idle": (SubjectText.WELCOME, SubjectText.BEGINS), "settling": (SubjectText.THANKS, SubjectText.LIFT),
     "resting": (SubjectText.REST, SubjectText.RESTING), "paused": (SubjectText.PAUSE, SubjectText.GOES_ON),
     "resuming": (SubjectText.PAUSE, SubjectText.GOES_ON), "ended": (SubjectText.THANKS, SubjectText.REST_HAND),
@@ -94,12 +94,12 @@ _PLAIN = {  # title and text of the pages on which nothing is to be done
 
 
 def usual_question(descriptor: str) -> str:
-    """Return what is asked in English where a block has no question."""
+    """Return the English question of a block that has none."""
     return f"Judge the {descriptor} of the surface"
 
 
 def translator(language: str) -> Translate:
-    """Return what makes a subject's language of the English texts; a text without a translation stays English."""
+    """Return a function from English texts to a language; a text without a translation stays English."""
     texts = translations(SUBJECT, language)
     return lambda text: texts.get(text, text)
 
@@ -108,26 +108,26 @@ def translator(language: str) -> Translate:
 class SubjectView:
     """One page for the subject."""
 
-    kind: Kind  # something to read, or a way to answer
+    kind: Kind  # reading, or a way to answer
     title: str
     text: str = ""
     ends: tuple[str, str] = ("", "")  # of the line
     ticks: int = 0  # on the line, between its ends
-    key: tuple[int, int] = (0, 0)  # trial and take: another one begins with an empty answer
-    hand: Hand = "right"  # that answers: where Next stands
+    key: tuple[int, int] = (0, 0)  # trial and take: a new key begins with an empty answer
+    hand: Hand = "right"  # the answering one, on whose side Next is
     language: str = ENGLISH
-    force: bool = False  # how hard the finger presses is shown; never how hard it drags, which would reveal the surface
+    force: bool = False  # show the normal force; the tangential force would reveal the surface
 
     @property
     def asks(self) -> bool:
-        """Say whether an answer is waited for."""
+        """Say whether the page waits for an answer."""
         return self.kind != "read"
 
 
 def subject_view(session: SessionState | None, translate: Translate = str, language: str = ENGLISH) -> SubjectView:
-    """Return what is shown to the subject now, translated from English by `translate`.
+    """Return the subject's present page, translated from English by `translate`.
 
-    `language` is the code of the one that is chosen before there is a session, which has its own.
+    `language` is the code of the chosen language while there is no session, which has its own.
     """
     if session is None:
         return SubjectView("read", translate(SubjectText.WELCOME), translate(SubjectText.BEGINS), language=language)
@@ -135,9 +135,9 @@ def subject_view(session: SessionState | None, translate: Translate = str, langu
 
 
 def mirror_view(session: SessionState, translate: Translate = str) -> SubjectView:
-    """Return what the experimenter sees of the subject's page, without what the protocol keeps from the experimenter.
+    """Return the experimenter's view of the subject's page, without elements that the protocol hides from them.
 
-    The bar of the force is left out too: in a picture that stands still it would show none.
+    The bar of the force is left out too: in a still picture it would show no force.
     """
     plan = session.plan
     hidden = {"forces", *({"trial count"} - set(plan.shown.experimenter))}
@@ -192,7 +192,7 @@ class _Page:
         trial, page = self.session.trial_state(self.session.trial), self._read(self.translate(SubjectText.WAIT))
         if trial is None:
             return page
-        # A descriptor is a word of the protocol's own language.
+        # A descriptor is a word in the protocol's own language.
         usual = usual_question(trial.trial.stimulus.descriptor)
         judge = usual if self.session.plan.language == ENGLISH else self.translate(SubjectText.JUDGE)
         page = replace(page, key=(trial.trial.number, trial.takes))
@@ -209,23 +209,23 @@ class _Page:
 
 @dataclass(frozen=True, slots=True)
 class PreviewPage:
-    """One page, with what it is called in a list."""
+    """One page and its name in a list."""
 
     name: str
     view: SubjectView
 
 
 def preview(form: SessionForm, translate: Translate = str) -> tuple[PreviewPage, ...] | Refusal:
-    """Return every page of the form's protocol in the form's language, each once, or what is wrong with the form.
+    """Return every page of the form's protocol in the form's language, each once, or the form's errors.
 
-    The session's own machine goes through every trial, and each page is the window's; codes and orders are an example.
+    The session's state machine runs through every trial, with the real pages; codes and orders are an example.
     """
     plan = _plan(form)
     return plan if isinstance(plan, Refusal) else tuple(_pages(plan, translate))
 
 
 def first_question(form: SessionForm, translate: Translate = str) -> SubjectView | Refusal:
-    """Return the first page of `preview` that asks something, or the first of all, or what is wrong with the form."""
+    """Return the first page of `preview` that asks a question, or the first of all, or the form's errors."""
     plan = _plan(form)
     if isinstance(plan, Refusal):
         return plan
@@ -235,7 +235,7 @@ def first_question(form: SessionForm, translate: Translate = str) -> SubjectView
 
 
 def _plan(form: SessionForm) -> SessionPlan | Refusal:
-    """Return an example of a plan of the form's protocol."""
+    """Return an example plan of the form's protocol."""
     folder = form.folder if form.study.strip() else "."  # nothing is written
     plain = replace(
         form, subject=PILOT, folder=folder, seed="", height="", normal="", area="", simulated=False, pilot=True
@@ -245,7 +245,7 @@ def _plan(form: SessionForm) -> SessionPlan | Refusal:
 
 
 def _pages(plan: SessionPlan, translate: Translate) -> Iterator[PreviewPage]:
-    """Yield the pages of a session in the order in which they come first, that of its end last."""
+    """Yield the pages of a session in the order of their first appearance, the page of its end last."""
     yield PreviewPage(tr("before the session"), subject_view(None, translate, plan.language))
     pages: dict[str, SubjectView] = {}
     session: SessionState = begin_session(SessionBegun("", plan, "people", None, 0, 1.0), 0.0)
@@ -291,16 +291,16 @@ def _next_event(state: states.State) -> steps.Event:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """An answer so far; empty until the line was touched."""
+    """The answer on the line so far; empty until the first touch."""
 
     positions: tuple[tuple[float, float], ...] = ()  # (session clock [s], 0 to 100)
-    corrections: int = 0  # how often an answer that stood was changed
-    device: Device | None = None  # that gave the last position
+    corrections: int = 0  # number of changes of the answer
+    device: Device | None = None  # of the last position
     pressed: bool = False  # a finger or button is down
 
     @property
     def score(self) -> float | None:
-        """Return where the mark stands; None before the first touch."""
+        """Return the position of the mark; None before the first touch."""
         return round(self.positions[-1][1], DIGITS) if self.positions else None
 
     def press(self, time: float, position: float, device: Device) -> "Answer":
@@ -309,7 +309,7 @@ class Answer:
         return replace(self._move(time, position, device), corrections=corrections, pressed=True)
 
     def drag(self, time: float, position: float, device: Device) -> "Answer":
-        """Return the answer after a movement of what is held down; it stays one answer, however far that goes."""
+        """Return the answer after a movement with finger or button down, which is still the same answer."""
         return self._move(time, position, device) if self.pressed else self
 
     def release(self) -> "Answer":
@@ -338,11 +338,11 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """A number, or one of two, as it is given: what stands, and how it came to stand."""
+    """A number, or one of two, while it is given: its value, first touch and corrections."""
 
     value: float | Which | None = None
     first_touch: float | None = None  # [s, session clock]
-    corrections: int = 0  # how often another value took the place of one
+    corrections: int = 0  # number of times that another value replaced one
     device: Device | None = None
 
     def choose(self, time: float, value: Which, device: Device) -> "Choice":
@@ -351,9 +351,9 @@ class Choice:
         return Choice(value, self._first(time), corrections, device)
 
     def type_number(self, time: float, number: float | None) -> "Choice":
-        """Return the answer after another number stands in the field at `time` [s]; it counts above 0 only.
+        """Return the answer after the number in the field changed at `time` [s]; only numbers above 0 count.
 
-        What stands while a number is typed is not yet an answer that is corrected.
+        Intermediate values while a number is typed are not corrections.
         """
         value = number if number is not None and number > 0.0 and isfinite(number) else None
         return Choice(value, self._first(time), self.corrections, "keyboard")
@@ -370,10 +370,10 @@ class Choice:
 
 
 def owner(key: str, asks: Kind, *, typing: bool, from_subject: bool = False) -> Owner:
-    """Return whose a key is while the subject is asked for `asks`, whichever window has the keyboard.
+    """Return the owner of a key while the subject is asked for `asks`, independent of the window with the focus.
 
-    While the experimenter types, every key is the text's, also one that reached the subject's window; of those that
-    the text leaves to its own window, none is an answer.
+    While the experimenter types, keys belong to the text, even those that reached the subject's window. Keys that the
+    text does not use are never answers.
 
     >>> owner("1", "choice", typing=False), owner("1", "choice", typing=True), owner("1", "line", typing=False)
     ('answer', 'text', 'course')

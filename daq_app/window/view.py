@@ -1,4 +1,4 @@
-"""What the window shows of what it knows: words, numbers and what each button would send. No Qt."""
+"""The window's view of its state: words, numbers and the message of each button. No Qt."""
 
 from dataclasses import asdict, dataclass, replace
 from math import isfinite
@@ -17,15 +17,15 @@ from drivers.transducer import TransducerInfo
 
 HEALTH_NAMES = tr_noop(("zeros", "moved", "noise", "overloads"))
 _UNITS = ("N", "N", "N", "N mm", "N mm", "N mm")
-COUNTERS = tuple(name for name in COUNT_LABELS if name not in ("received", "off_rate"))  # the rate has its own sentence
-LAGGING = 100.0  # a reading handed over later than this is worth a look [ms]
+COUNTERS = tuple(name for name in COUNT_LABELS if name not in ("received", "off_rate"))  # the rate has its sentence
+LAGGING = 100.0  # delay of a reading above which it is reported [ms]
 ENDED = {  # by how far the sealing is
     "no": tr_noop("ended"), "running": tr_noop("ended, being sealed"),
     "cut short": tr_noop("ended, not sealed"), "sealed": tr_noop("ended and sealed"),
 }  # fmt: skip
-SILENT = 3.0  # a recorder that reported nothing for longer is called silent [s]
-NO_READINGS = 1.0  # a transducer that sent nothing for longer is called silent: its rate is measured over this time [s]
-UNSAVED = 3.0  # the recording lamp goes out when nothing became safe for longer [s]
+SILENT = 3.0  # time without a report after which the recorder counts as silent [s]
+NO_READINGS = 1.0  # time without a reading after which the transducer counts as silent: the span of its rate [s]
+UNSAVED = 3.0  # time without newly safe data after which the recording lamp goes out [s]
 
 
 def life_rows(info: TransducerInfo | None, life: Life | None) -> tuple[tuple[str, str], ...]:
@@ -48,24 +48,24 @@ def life_rows(info: TransducerInfo | None, life: Life | None) -> tuple[tuple[str
 
 
 def greatest(six: tuple[float, ...]) -> str:
-    """Return the greatest force and the greatest torque of six."""
+    """Return the text of the greatest force and the greatest torque of six."""
     return f"{_noise(max(map(abs, six[:3])), 'N')}, {_noise(max(map(abs, six[3:])), 'N mm')}"
 
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """How far one axis, or all together, is loaded."""
+    """The load of one axis, or of all combined."""
 
     name: str
-    share: float | None  # now; 1 is the rated load; None where no range is stated
-    peak: float | None  # since somebody acknowledged
+    share: float | None  # now; 1 is the rated load; None without a stated range
+    peak: float | None  # since it was acknowledged
     overloaded: bool
-    noise: str  # standard deviation with its unit; a dash where no zero was measured
+    noise: str  # standard deviation with its unit; a dash without a measured zero
 
 
 @dataclass(frozen=True, slots=True)
 class BenchView:
-    """Everything about the bench."""
+    """The displayed data of the bench."""
 
     lamp: Literal["off", "well", "look", "wrong"]
     lamp_text: str
@@ -73,24 +73,24 @@ class BenchView:
     serial: str
     calibration: str
     rate: str
-    silent: bool  # nothing is measured now, or nothing of it is heard
+    silent: bool  # nothing is measured now, or the recorder does not report it
     counters: tuple[tuple[str, str], ...]
     bars: tuple[Bar, ...]
     tare: str  # its figures
     drift: str
-    noise: str  # of the zero: that of the loudest force and torque
+    noise: str  # of the zero: the greatest of forces and of torques
     life: tuple[tuple[str, str], ...]  # of its serial number
-    devices: tuple[tuple[str, str], ...]  # address and words of each that can be connected
+    devices: tuple[tuple[str, str], ...]  # address and description of each available device
     searching: bool
-    search_text: str  # what a search came to; empty before the first
+    search_text: str  # result of the last search; empty before the first
     uri: str
-    connect: Message | None  # what Disconnect or Connect would send; None while neither is possible
+    connect: Message | None  # message of Disconnect or Connect; None while neither is possible
     can_tare: bool
     can_acknowledge: bool
 
 
 def bench_summary(view: BenchView) -> str:
-    """Return what the card of the transducer says: which it is, its zero, noise and life."""
+    """Return the text of the transducer's card: its name, zero, noise and history."""
     if view.lamp == "off":
         return f"{view.name}: {view.lamp_text}."
     zero = tr("Zero: {zero}.", zero=view.tare.rsplit("\n", 1)[-1])
@@ -100,7 +100,7 @@ def bench_summary(view: BenchView) -> str:
 
 
 def bench_view(bench: BenchState, *, recording: bool, unheard: float = 0.0) -> BenchView:
-    """Return what is shown of the bench; `recording` keeps it connected, `unheard` is the last report's age [s]."""
+    """Return the view of the bench; `recording` keeps it connected, `unheard` is the last report's age [s]."""
     info = bench.info
     if unheard > SILENT:
         bench = replace(bench, silence=bench.silence + unheard)
@@ -164,7 +164,7 @@ def _bench_lamp(bench: BenchState, *, recording: bool) -> tuple[Literal["off", "
 
 
 def _losses(bench: BenchState) -> tuple[Literal["well", "look"], str]:
-    """Return what was counted of the stream, in words."""
+    """Return the stream's losses in words, and their grade."""
     counts = asdict(bench.health)
     troubles = [f"{counts[name]} {tr(COUNT_LABELS[name])}" for name in COUNTERS if counts[name]]
     rate = [bench.health.rate_words] if bench.health.off_rate else []
@@ -198,7 +198,7 @@ def _share(value: float) -> float | None:
 
 
 def _noise(value: float, unit: str) -> str:
-    """Return a standard deviation in the smaller unit, two digits.
+    """Return a standard deviation with two digits, in mN or N mm.
 
     >>> _noise(0.0042, "N"), _noise(0.152, "N"), _noise(0.052, "N mm")
     ('4.2 mN', '152 mN', '0.052 N mm')
@@ -241,11 +241,11 @@ def _devices(bench: BenchState) -> tuple[tuple[str, str], ...]:
 
 @dataclass(frozen=True, slots=True)
 class Lamp:
-    """Whether what happens is being written down; fed by the store's acknowledgement alone."""
+    """Whether data are being stored, by the store's acknowledgements only."""
 
     grade: Literal["off", "on", "wrong"]
     text: str
-    age: str  # how old the last acknowledged thing is; empty where there is no session
+    age: str  # age of the latest acknowledged data; empty without a session
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,7 +254,7 @@ class Banner:
 
     grade: Literal["wrong", "look"]
     sentence: str
-    action: str = ""  # label of its button; empty where there is none
+    action: str = ""  # label of its button; empty without one
     sends: Message | None = None
 
 
@@ -269,11 +269,11 @@ class View:
     course: CourseView | None  # None: the page of a new session is shown
     bench: BenchView
     subject: SubjectView
-    mirror: SubjectView | None = None  # what of it the experimenter sees; None where no session is in hand
+    mirror: SubjectView | None = None  # the experimenter's view of it; None without a session
 
 
 def derive_view(state: AppState, translate: Translate = str) -> View:
-    """Return what is to be shown of a state; `translate` makes the subject's language of English."""
+    """Return the view of a state; `translate` converts English to the subject's language."""
     session = state.session
     simulated = session.simulated if session else None
     if session is None and state.bench.info is not None and state.bench.info.simulated:
@@ -294,7 +294,7 @@ def derive_view(state: AppState, translate: Translate = str) -> View:
 
 
 def _unheard(state: AppState) -> float:
-    """Return for how long nothing was heard from the recorder [s]."""
+    """Return the time since the recorder's last report [s]."""
     return 0.0 if state.last_report is None else state.now - state.last_report
 
 
@@ -317,11 +317,11 @@ def _lamp(state: AppState) -> Lamp:
 
 
 def _banner(state: AppState) -> Banner | None:
-    """Return the worst that is to be said; one at a time."""
+    """Return the most severe message as a banner, None if there is none."""
     session, bench = state.session, state.bench
     running = session is not None and not session.is_over
     if session is not None and (sentence_text := _cut_short(state, session)):
-        return Banner("wrong", sentence_text)  # the button of what to do now goes on, where it can
+        return Banner("wrong", sentence_text)  # the current step's button resumes, if that is possible
     if state.exit_reason is not None and session is not None and session.sealing == "cut short":
         sentence_text = tr(
             "The recorder has ended while it sealed. Everything is kept: 'daq-app resume --end {folder}' seals it.",
@@ -356,10 +356,10 @@ def _banner(state: AppState) -> Banner | None:
 
 
 def _no_readings(bench: BenchState, *, running: bool) -> str:
-    """Return why nothing comes from a transducer that should send; empty where something does."""
+    """Return why a transducer that should send does not; empty if it does."""
     if bench.link == "lost":
         lost = tr(" Readings are being lost; what came before is kept.") if running else ""
-        problem = (bench.problem or "").removeprefix("the transducer does not answer; ")  # which the banner says itself
+        problem = (bench.problem or "").removeprefix("the transducer does not answer; ")  # the banner itself says that
         return tr("The transducer does not answer: {problem}.{lost}", problem=problem, lost=lost)
     if running and _is_silent(bench):
         text = tr("No readings for {age:.0f} s: check power and cable of the transducer.", age=bench.silence)
@@ -368,7 +368,7 @@ def _no_readings(bench: BenchState, *, running: bool) -> str:
 
 
 def _cut_short(state: AppState, session: SessionState) -> str:
-    """Return why a session ended before its time; empty where it ended as somebody wished, or is being taken up."""
+    """Return why a session ended early; empty if it ended as intended, or is being resumed."""
     end, bench, safe = session.end, state.bench, tr("What was saved until then is in {folder}.", folder=session.folder)
     if session.phase == "resuming":
         return ""
@@ -382,7 +382,7 @@ def _cut_short(state: AppState, session: SessionState) -> str:
     reason = end.reason
     if end.cause == "device":
         reason = tr("the transducer fell silent; it answers again") if bench.link == "open" else bench.problem or reason
-    if end.cause == "disk":  # its reason says what is safe
+    if end.cause == "disk":  # its reason names the safe data
         return tr("The session was cut short: {why}.", why=reason)
     return tr("The session was cut short: {why}. Everything until then is kept.", why=reason)
 

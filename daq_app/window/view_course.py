@@ -1,4 +1,4 @@
-"""The course of a session as the experimenter sees it: what to do now, the plan, its trials and their strokes."""
+"""The experimenter's view of a session: the current step, the plan, its trials and their strokes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,14 +12,14 @@ from sessions.plan.plan import PROXIMAL_TO_DISTAL, SessionPlan, Trial
 from sessions.run import steps
 from sessions.strokes.stroke import Stroke
 
-NO_ANSWER: Mapping[type, steps.Event] = {  # of a subject who cannot say
+NO_ANSWER: Mapping[type, steps.Event] = {  # of a subject who cannot decide
     steps.AskScore: steps.Scored(None),
     steps.AskNumber: steps.MagnitudeEstimate(None),
     steps.AskChoice: steps.PairedChoice(None),
 }
 _DIRECTIONS = {1: tr_noop("away from the subject"), -1: tr_noop("towards the subject")}
 TileKind = Literal["done", "redone", "flawed", "current", "skipped", "coming"]
-TILES: dict[TileKind, tuple[str, str]] = {  # a shape that shows the state without colour, and the state in words
+TILES: dict[TileKind, tuple[str, str]] = {  # a shape that identifies the state without colour, and the state in words
     "done": ("✓", tr_noop("done")),
     "redone": ("↻", tr_noop("done again")),
     "flawed": ("!", tr_noop("done, its stroke has a flaw")),
@@ -34,7 +34,7 @@ NO_FORCES = tr_noop("Forces are not shown in this protocol.")
 
 @dataclass(frozen=True, slots=True)
 class Tile:
-    """One trial: its shape and words tell its state without colour."""
+    """One trial: its shape and words identify its state without colour."""
 
     number: int
     code: str
@@ -52,12 +52,12 @@ class Tile:
 
 @dataclass(frozen=True, slots=True)
 class Inspection:
-    """What is shown of one trial: never what is measured now."""
+    """The displayed data of one trial, never live readings."""
 
     number: int
     heading: str
-    verdict: str  # one line; or why there is none
-    details: str  # every flaw at length, the worst first
+    verdict: str  # one line, or why there is none
+    details: str  # every flaw in full, the worst first
     grade: Literal["none", "good", "doubtful", "refused"] = "none"
     cells: tuple[tuple[str, str], ...] = tuple((name, "–") for name in PICTURE)  # means over the steady window
     stroke: Stroke | None = None
@@ -65,13 +65,13 @@ class Inspection:
 
 @dataclass(frozen=True, slots=True)
 class Button:
-    """Something the experimenter can do."""
+    """An action of the experimenter."""
 
     label: str
     key: str
     enabled: bool = True
-    sends: Message | None = None  # None: it opens something in the window, such as the line for a reason
-    question: str = ""  # asked beside the line for a reason
+    sends: Message | None = None  # None: it opens a part of the window, such as the line for a reason
+    question: str = ""  # next to the line for a reason
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ class PlanRow:
     """A line of the plan: a block's heading, or a trial."""
 
     kind: Literal["block", "done", "current", "coming", "skipped"]
-    mark: str  # shape that shows the kind without colour
+    mark: str  # shape that identifies the kind without colour
     name: str
     outcome: str = ""  # the result
 
@@ -90,28 +90,28 @@ class StrokeView:
 
     grade: Literal["none", "good", "doubtful", "refused"]
     text: str
-    details: str = ""  # at length, for a hover or a screen reader
-    redo: steps.Redo | None = None  # sent by one key where something is wrong
+    details: str = ""  # in full, for a tool tip or a screen reader
+    redo: steps.Redo | None = None  # sent by one key if there is a flaw
 
 
 @dataclass(frozen=True, slots=True)
 class CourseView:
-    """Everything about the course."""
+    """The displayed data of the session."""
 
     headline: str
     primary: Button | None
-    direction: int  # of the stroke to be made: +1 away from the subject, -1 towards, 0 where none is in hand
-    timer: str  # how long it has been waited for what is asked
+    direction: int  # of the next stroke: +1 away from the subject, -1 towards, 0 if none is due
+    timer: str  # time spent waiting for the current step
     notice: str
     rows: tuple[PlanRow, ...]
     tiles: tuple[Tile, ...]
     stroke: StrokeView
-    buttons: Mapping[str, Button]  # by the act that each stands for
-    no_forces: str  # why none are shown; empty where they are
+    buttons: Mapping[str, Button]  # by action
+    no_forces: str  # why no forces are shown; empty if they are
 
 
 def course_view(session: SessionState, bench: BenchState, now: float) -> CourseView:
-    """Return what is shown of a session."""
+    """Return the view of a session."""
     (headline, primary), over = _to_do(session, bench), session.is_over
     targets = redo_targets(session)
     stroke, trial = _stroke(session, targets), session.trial_state(session.trial)
@@ -139,7 +139,7 @@ def _no_forces(plan: SessionPlan) -> str:
 def _buttons(session: SessionState, trial: TrialState | None) -> dict[str, Button]:
     phase = session.phase
     by_digits = isinstance(session.command, steps.AskNumber | steps.AskChoice)
-    key = "" if by_digits else "0"  # which a subject may press by mistake
+    key = "" if by_digits else "0"  # a digit that a subject may press by mistake
     why_skip = "" if trial is None else tr("Why is {trial} left out?", trial=_name_trials((trial,)))
     pause = Button(tr("Pause"), "P", phase in IN_A_TRIAL, steps.Pause())
     end = Button(tr("End"), "Ctrl+E", question=tr("Why does the session end now?"))
@@ -155,7 +155,7 @@ def _buttons(session: SessionState, trial: TrialState | None) -> dict[str, Butto
 
 
 def _redo(targets: tuple[TrialState, ...], sends: steps.Redo | None) -> Button:
-    """Return the button that names what it discards."""
+    """Return the redo button, which names the trials that it discards."""
     if not targets:
         return Button(tr("Redo"), "R", enabled=False)
     numbers = "–".join(str(trial.trial.number) for trial in targets)
@@ -176,7 +176,7 @@ def _name_trials(trials: tuple[TrialState, ...]) -> str:
 
 
 def _to_do(session: SessionState, bench: BenchState) -> tuple[str, Button | None]:
-    """Return the one sentence, and the one button that does what it says."""
+    """Return the sentence of the current step, and its button."""
     match session.phase:
         case "idle" if bench.link == "lost":
             return tr("Wait: the transducer does not answer."), None
@@ -292,7 +292,7 @@ def _row(session: SessionState, trial: TrialState) -> PlanRow:
 
 
 def _mu(stroke: Stroke | None) -> str:
-    """Return the coefficient as its interval: no digit more than is known."""
+    """Return the coefficient as an interval, without insignificant digits."""
     if stroke is None or stroke.mu_dynamic is None:
         return "µ –"
     low, high = stroke.mu_dynamic_interval or (stroke.mu_dynamic, stroke.mu_dynamic)
@@ -324,7 +324,7 @@ def tiles(session: SessionState) -> tuple[Tile, ...]:
 
 
 def inspection(session: SessionState, number: int) -> Inspection | None:
-    """Return what is shown of a trial; None where the session has no trial of that number."""
+    """Return the inspection of a trial; None if the session has no trial with that number."""
     trial = session.trial_state(number)
     if trial is None:
         return None
@@ -348,7 +348,7 @@ def inspection(session: SessionState, number: int) -> Inspection | None:
 
 
 def verdict(quality: Quality) -> str:
-    """Return one verdict on a stroke: whether it is to be done again, the worst flaw, then what to do."""
+    """Return the verdict on a stroke: whether to redo it, the worst flaw, then the remedy."""
     if not quality.remarks:
         return tr("Good")
     worst = quality.remarks[0]
