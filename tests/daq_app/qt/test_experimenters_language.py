@@ -33,7 +33,7 @@ pytestmark = pytest.mark.qt
 DATA = re.compile(
     "|".join((*protocol_names(), *FORMATS)) + r"|SIMULATED Net F/T[^:]*|SIM00000|three"
     r"|stickiness|slipperiness|/\S*|English \(en\)|kPa|SED|SVG|PNG|CSV|analyst|dragged by hand"
-    r"|counts(?: per unit read from)?|Ctrl|P01_\S*|<[^>]*>|&\w+;|finite strain \d+ to \d+ % of the SED"
+    r"|counts(?: per unit read from)?|Ctrl|P01_\S*|<[^>]*>|&\w+;|finite strain \d+ to \d+\s% of the SED"
     # The process that reads a recording has the program's own translations:
     r"|data sets readings/\S*, rows \d+ to \d+|mean before contact, readings: \d+"
 )
