@@ -27,13 +27,14 @@ DRIVERS: tuple[Driver, ...] = tuple(
 )
 
 
-def open_transducer(uri: str, clock: Clock) -> Transducer:
+def open_transducer(uri: str, clock: Clock, *other_schemes: str) -> Transducer:
     """Return the transducer at `uri`, identified and set up by its address, not yet streaming.
 
-    Raises SetupError when the address or a setting is not possible, LinkLost when nothing answers.
+    The caller itself opens addresses of `other_schemes`; messages name them. Raises SetupError when the address or a
+    setting is not possible, LinkLost when nothing answers.
     """
     address, tool = without_tool(parse_address(uri))
-    transducer = _driver(address).open(address, clock, Deadline.for_opening())
+    transducer = _driver(address, *other_schemes).open(address, clock, Deadline.for_opening())
     return WrappedTransducer(transducer, with_tool(transducer.info, tool)) if tool else transducer
 
 
@@ -51,9 +52,9 @@ def _probe(uri: str, patience: float) -> Probe:
         return Probe(uri, None, str(error))
 
 
-def _driver(address: Address) -> Driver:
+def _driver(address: Address, *other_schemes: str) -> Driver:
     for driver in DRIVERS:
         if driver.name == address.scheme:
             return driver
-    schemes = ", ".join(f"{driver.name}://" for driver in DRIVERS)
-    raise AddressError(f"{address.uri}: there is no driver {address.scheme!r}; addresses begin with {schemes}")
+    schemes = ", ".join((*(f"{driver.name}://" for driver in DRIVERS), *other_schemes))
+    raise AddressError(f"there is no driver {address.scheme!r} for {address.uri}; addresses begin with {schemes}")

@@ -70,7 +70,7 @@ def connect(uri: str, clock: Clock) -> Generator[Connection]:
         return
     address = parse_address(uri)
     if address.scheme != _SIMULATED:
-        with closing(open_transducer(uri, clock)) as transducer:
+        with closing(open_transducer(uri, clock, f"{_SIMULATED}:", REPLAY)) as transducer:
             yield Connection(transducer)
         return
     check_form(address, "sim:?seed=7&rate=200", _OPTIONS)

@@ -19,7 +19,7 @@ from sessions.report.wording import capital, correlation, digits, full_stop, plu
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.multiverse import Kinematics
 from sessions.statistics.scores import by_key
-from sessions.statistics.visit import Exclusion
+from sessions.statistics.visit import STILL_BLINDED, Exclusion
 
 _MOST_NAMED = 12  # names listed in full
 
@@ -41,6 +41,7 @@ def summary(study: StudyFindings) -> list[str]:
     subjects = {visit.subject for visit in study.visits}
     verb = "was" if len(study.visits) == 1 else "were"
     sentences = [f"{plural(len(study.visits), 'session')} of {plural(len(subjects), 'subject')} {verb} read."]
+    sentences += [] if study.descriptors else ["No trial counts."]
     for findings in study.descriptors:
         sentences += _relation_sentences(findings, study)
         sentences += scale_sentences(findings)
@@ -122,6 +123,7 @@ def subject_facts(study: StudyFindings) -> list[Fact]:
 def exclusion_sentences(study: StudyFindings) -> list[str]:
     """Return a sentence for each exclusion from the results, with its author and reason."""
     sentences = [f"Session {name} could not be read, and nothing of it counts: {text}." for name, text in study.failed]
+    sentences += [f"Session {name} is {STILL_BLINDED}." for name in study.blinded]
     sentences += [
         f"Session {session} holds the same recording as {first}, to the last reading and event, and counts nothing."
         for session, first in study.copies
@@ -129,7 +131,7 @@ def exclusion_sentences(study: StudyFindings) -> list[str]:
     sentences += [
         f"Subject {exclusion.subject}: {_trials_of(exclusion)} left out by {exclusion.who}: {full_stop(exclusion.why)}"
         for exclusion in study.excluded
-        if _fits(study, exclusion)
+        if exclusion not in study.misfits
     ]
     return [*sentences, *_decision_sentences(study, leaving_out=True), *_trials_without_sed(study)]
 
@@ -168,11 +170,11 @@ def remarks(study: StudyFindings) -> list[str]:
     for outcome, opening in (("not answered", "No score, for the subject did not answer"), ("open", "Not done")):
         trials = [f"{v.session} trial {r.trial}" for v in study.visits for r in v.rows if r.outcome == outcome]
         sentences += [f"{opening}: {_first_few(trials)}."] if trials else []
+    descriptors = ", ".join(sorted({row.descriptor for visit in study.visits for row in visit.rows})) or "nothing"
     sentences += [
         f"A decision of {exclusion.who} leaves out {_trials_of(exclusion)} of subject {exclusion.subject} "
-        f"({exclusion.why}), and no session read has such trials; see exclusions.toml."
-        for exclusion in study.excluded
-        if not _fits(study, exclusion)
+        f"({exclusion.why}), and no session read has such trials, only trials on {descriptors}; see exclusions.toml."
+        for exclusion in study.misfits
     ]
     sentences += [
         f"The {descriptor} scores of {subject} fall as the index rises (r = {correlation(r)}); the scale may have been "
@@ -214,12 +216,6 @@ def _range_of(shares: Sequence[float]) -> str:
 
 def _trials_of(exclusion: Exclusion) -> str:
     return f"trials on {exclusion.descriptor}" if exclusion.descriptor else "every trial"
-
-
-def _fits(study: StudyFindings, exclusion: Exclusion) -> bool:
-    """Say whether any session has a trial that a decision leaves out."""
-    rows = chain.from_iterable(visit.rows for visit in study.visits if visit.subject == exclusion.subject)
-    return any(exclusion.descriptor in ("", row.descriptor) for row in rows)
 
 
 def _trials_without_sed(study: StudyFindings) -> list[str]:

@@ -16,7 +16,7 @@ from sessions.statistics.psychometric import Psychometric
 from sessions.statistics.rivals import Rival
 from sessions.statistics.scales import Consistence, Exponent, Judgement, PairedScale
 from sessions.statistics.scores import Average, IntervalEstimate, MeanScore, reversed_subjects
-from sessions.statistics.visit import Exclusion, Visit, VisitOptions, scores_of
+from sessions.statistics.visit import Exclusion, Visit, VisitOptions, exclusion_of, scores_of
 from sessions.statistics.within_subjects import Agreement, Difference, RepeatedCorrelation, WithinMean
 
 SED_TERM = "SED [kPa]"
@@ -174,6 +174,17 @@ class StudyFindings:
     flaws: tuple[FlawDetection, ...] = ()  # where the study is synthetic
     synthetic: int | None = None  # the seed of a synthetic study
     response: str = SED.name  # the model's quantity that is compared with scores
+    blinded: tuple[str, ...] = ()  # sessions that count nothing until their key is opened
+
+    @property
+    def misfits(self) -> tuple[Exclusion, ...]:
+        """Return the decisions that leave out no trial of a session that was read."""
+        present = {(visit.subject, row.descriptor) for visit in self.visits for row in visit.rows}
+        return tuple(
+            exclusion
+            for exclusion in self.excluded
+            if not any(exclusion_of((exclusion,), *trial) is not None for trial in present)
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the findings as plain data."""

@@ -52,7 +52,7 @@ from sessions.statistics.scores import (
     score_matrix,
     surface_means,
 )
-from sessions.statistics.visit import Exclusion, TrialRow, Visit, VisitOptions, exclusion_of, scores_of
+from sessions.statistics.visit import STILL_BLINDED, Exclusion, TrialRow, Visit, VisitOptions, exclusion_of, scores_of
 from sessions.statistics.within_subjects import (
     RepeatedCorrelation,
     Table,
@@ -100,7 +100,8 @@ def pool_visits(
         simulated=sentence if simulated else "",
         options=options,
         visits=in_order,
-        failed=tuple(sorted(failed)),
+        failed=tuple(sorted(failure for failure in failed if failure[1] != STILL_BLINDED)),
+        blinded=tuple(sorted(session for session, reason in failed if reason == STILL_BLINDED)),
         copies=tuple((visit.session, copies[visit.session]) for visit in in_order if visit.session in copies),
         excluded=exclusions,
         reversed=reversed_subjects(tables),

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from sessions.plan.plan import Block
+from sessions.plan.plan import Blinded, Block
 from sessions.prediction import BY_NAME, SED, PredictionOptions, SessionPrediction, TrialPrediction, predict
 from sessions.prediction.sealed_predictions import SEAL_NUMBERS, sealed_sentence
 from sessions.prediction.stored import Number, model_facts
@@ -62,6 +62,7 @@ def exclusion_of(exclusions: tuple[Exclusion, ...], subject: str, descriptor: st
 
 
 FORM = 12  # version of rows; stored rows of another version are computed again
+STILL_BLINDED = "still blinded, and counts nothing until 'daq-app unblind' opens the key"
 NO_INTERVAL = "intervals of the SED were not asked for"
 
 
@@ -169,6 +170,8 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
     Raises Blinded while the stimuli's key is sealed, RecordingError where the session cannot be read.
     """
     recording = reveal(recording)
+    if recording.plan.blinded:
+        raise Blinded(STILL_BLINDED)
     gain_error = gain_error_set(recording.folder) if options.gain_error is None else options.gain_error
     analysis = analyse(recording, AnalysisSettings(area=options.area, gain_error=gain_error))
     prediction = None

@@ -55,6 +55,42 @@ def test_a_session_that_cannot_be_read_is_named_and_the_rest_of_its_study_is_don
     assert (code, {row["stimulus"]["index"] for row in prediction["trials"]}) == (3, {0})
 
 
+def test_a_session_that_is_still_blinded_is_named_apart_from_those_that_cannot_be_read(study, tmp_path, capsys):
+    code, document = run_json(capsys, "study", study, "--out", tmp_path / "out")
+    assert code == 3
+    assert document["study"]["failed"] == []
+    assert document["study"]["blinded"] == ["P01_forces", "P01_scores", "P02_scores"]
+    assert run(["study", str(study), "--out", str(tmp_path / "out")]) == 3
+    text = capsys.readouterr().out
+    assert "Session P01_scores is still blinded, and counts nothing until 'daq-app unblind' opens the key." in text
+    assert "No trial counts." in text
+    assert "could not be read" not in text
+
+
+@pytest.mark.parametrize(("subject", "descriptor"), [("P02", "sticky"), ("P77", "")])
+def test_a_decision_that_leaves_out_nothing_is_a_flaw_and_the_descriptors_are_named(
+    study, tmp_path, capsys, subject, descriptor
+):
+    folder = tmp_path / "friction"
+    shutil.copytree(study / "P02_scores", folder / "P02_scores")
+    assert run(["unblind", str(folder / "P02_scores"), "--by", "E02", "--study", str(study)]) == 0
+    decision = '[[exclude]]\nsubject = "{}"\nwhy = "fell asleep"\nwho = "E02"\ndescriptor = "{}"\n'
+    (folder / "exclusions.toml").write_text(decision.format("P02", "slipperiness"))
+    capsys.readouterr()
+    assert run(["study", str(folder)]) == 0
+    (folder / "exclusions.toml").write_text(decision.format(subject, descriptor))
+    assert run(["study", str(folder)]) == 3
+    assert "no session read has such trials, only trials on slipperiness, stickiness;" in capsys.readouterr().out
+
+
+def test_a_study_in_which_no_trial_counts_is_a_flaw(tmp_path, capsys):
+    rows = "".join(f"{0.01 * k:.2f},0,0,-1,0,0,0\n" for k in range(500))
+    (tmp_path / "plain.csv").write_text(f"t[s],Fx[N],Fy[N],Fz[N],Tx[Nmm],Ty[Nmm],Tz[Nmm]\n{rows}")
+    assert run(["import", str(tmp_path / "plain.csv"), "--out", str(tmp_path / "study" / "plain")]) in (0, 3)
+    assert run(["study", str(tmp_path / "study")]) == 3
+    assert "No trial counts." in capsys.readouterr().out
+
+
 def test_a_blinded_session_away_from_its_study_is_unblinded_with_the_study_that_is_named(study, tmp_path, capsys):
     away = shutil.copytree(study / "P01_scores", tmp_path / "away")
     assert run(["unblind", str(away), "--by", "E02"]) == 1

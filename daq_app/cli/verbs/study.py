@@ -208,7 +208,7 @@ def _pool(options: argparse.Namespace, folder: Path, output: Path, console: Cons
     console.result({**places, "study": study.to_dict() | {"visits": [visit.session for visit in study.visits]}})
     _print(study, files, console)
     flawed = any(visit.losses or any(row.flaws for row in visit.rows) for visit in study.visits)
-    return FLAWED if failures or flawed else DONE
+    return FLAWED if failures or flawed or study.misfits or not study.descriptors else DONE
 
 
 def _load_ground_truth(folder: Path) -> dict[str, Any] | None:
