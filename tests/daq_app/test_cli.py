@@ -131,7 +131,7 @@ def test_what_is_no_number_is_refused_with_what_is_allowed(arguments, words, cap
 
 @pytest.mark.parametrize("words", [["devices", "probe", "foo:"], ["run", "paired-comparison", "--device", "foo:"]])
 def test_an_address_of_no_driver_is_refused_with_every_beginning_that_an_address_may_have(words, capsys, tmp_path):
-    further = ["--subject", "P01", "--simulate-subject", "1", "--out", str(tmp_path / "P01")] if "run" in words else []
+    further = ["--subject", "P01", "--headless", "--out", str(tmp_path / "P01")] if "run" in words else []
     assert run([*words, *further]) == 2
     sentence = capsys.readouterr().err
     assert "there is no driver 'foo' for foo:; addresses begin with " in sentence
