@@ -1,1 +1,1 @@
-"""The window: Qt shows what `daq_app.window.view` derives and hands back what people do. Nothing here decides."""
+"""The window in Qt: it shows the views of `daq_app.window.view` and returns people's acts, but decides nothing."""

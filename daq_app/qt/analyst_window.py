@@ -1,4 +1,4 @@
-"""The analyst's window: trials, the stroke of the chosen one, and what the model says of it."""
+"""The analyst's window: trials, the stroke of the chosen one, and the model's answer to it."""
 
 from collections.abc import Callable
 from html import escape
@@ -36,15 +36,15 @@ from sessions.exchange import FORMATS
 from sessions.prediction import QUANTITIES
 from sessions.report.wording import shown_response
 
-_LOOK = 30  # between two looks at the work [ms]
-_ONE_ROW = 760  # width in which what is being done stands beside the buttons, before the font's scale [px]
-_LEAST = (480, 320)  # the window can be made as small as that [px]
+_LOOK = 30  # between two polls of the work [ms]
+_ONE_ROW = 760  # width from which the progress is in a row with the buttons, before the font's scale [px]
+_LEAST = (480, 320)  # least size of the window [px]
 
 
 class LineageLabel(QLabel):
     """Links in their order."""
 
-    followed = Signal(str)  # the place that a link leads to
+    followed = Signal(str)  # target of the link
 
     def __init__(self) -> None:
         super().__init__()
@@ -68,7 +68,7 @@ class LineageLabel(QLabel):
         self.setAccessibleName(tr("from the number back to its readings: {whole}", whole=text))
 
     def changeEvent(self, event: QEvent) -> None:
-        """Write the links in the colour of another theme."""
+        """Redraw the links in the colour of a new theme."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.StyleChange:
             self._show()
@@ -84,10 +84,10 @@ class LineageLabel(QLabel):
 
 
 class AnalystWindow(QMainWindow):
-    """A session folder, followed from its trials to the model. It knows nothing but the last `AnalystState`."""
+    """A session folder, from its trials to the model. It shows the latest `AnalystState`."""
 
     def __init__(self, folder: Path, tokens: Tokens, work: Analyst | None = None) -> None:
-        """Open `folder`; `work` is done by another process, begun here where none is given."""
+        """Open `folder`; `work` runs in another process, started here if none is given."""
         super().__init__()
         self.setWindowTitle(f"{folder.name} – daq-app")
         self.setAccessibleName(tr("analyst's window"))
@@ -112,7 +112,7 @@ class AnalystWindow(QMainWindow):
         self.format = choice(tr("format of the export"), sorted(FORMATS))
         self.export = button(tr("Export…"), tr("write an export"), self.write_export)
         self._columns = {tr("Trials"): self.trials, tr("Stroke"): self.stroke, tr("Model"): self.model}
-        self._areas = [scroll_area(column) for column in self._columns.values()]  # one that is too high is never cut
+        self._areas = [scroll_area(column) for column in self._columns.values()]  # scrolled if too high
         self._panels = [Panel(name.lower()) for name in self._columns]
         for panel, area in zip(self._panels, self._areas, strict=True):
             vbox(area, on=panel, margins=GRID)
@@ -148,7 +148,7 @@ class AnalystWindow(QMainWindow):
             super().keyPressEvent(event)
 
     def press(self, event: QKeyEvent) -> bool:
-        """Take a key of this window, wherever the keyboard is; return whether it meant anything."""
+        """Handle a key of this window, independent of the focus; return whether it has a meaning."""
         control = event.modifiers() & Qt.KeyboardModifier.ControlModifier
         match event.key():
             case _ if event.matches(QKeySequence.StandardKey.Undo):
@@ -180,7 +180,7 @@ class AnalystWindow(QMainWindow):
         super().closeEvent(event)
 
     def hand_over(self, tokens: Tokens) -> "AnalystWindow":
-        """Return a window in another theme that shows what this one does and goes on with its work."""
+        """Return a window in another theme with the same content, which takes over the work."""
         self._timer.stop()
         window = AnalystWindow(self.state.folder, tokens, self._work)
         window.state = self.state
@@ -218,7 +218,7 @@ class AnalystWindow(QMainWindow):
                 self.stroke.go_to_readings()
 
     def _replay_next(self) -> None:
-        """Go on with the next trial when one was replayed to its end."""
+        """Replay the next trial after the end of one."""
         if self.state.row + 1 < len(rows(self.state)):
             self.stroke.play()
             self.ask(m.Choose(self.state.row + 1))
@@ -239,7 +239,7 @@ class AnalystWindow(QMainWindow):
         self.lineage.show_links(lineage(state))
         for column in (self.trials, self.stroke, self.model):
             column.show_state(state)
-        QTimer.singleShot(0, self, self._place_columns)  # once the layouts inside of the columns have followed
+        QTimer.singleShot(0, self, self._place_columns)  # after the layouts inside the columns
 
     def _place_columns(self) -> None:
         least = [column.minimumSizeHint().width() + 2 * GRID for column in self._columns.values()]
@@ -257,7 +257,7 @@ class AnalystWindow(QMainWindow):
             else:
                 self._row.addWidget(panel, stretch)
                 panel.show()
-        if narrow and self.state.comparison is not None:  # what has just come stays in sight
+        if narrow and self.state.comparison is not None:  # keep the comparison in sight
             self._pages.setCurrentIndex(2)
 
     def _lay_out(self) -> QWidget:
@@ -266,7 +266,7 @@ class AnalystWindow(QMainWindow):
         self.format.setFixedWidth(px(90))
         window = QWidget()
         window.setObjectName("window")
-        window.setMinimumSize(*_LEAST)  # the columns find room in less than they would like
+        window.setMinimumSize(*_LEAST)  # the columns fit into less than their preferred size
         acts = self.stop, self.go_on, self.report, self.format, self.export
         header, status = hbox((self.lineage, 1), self._simulation_label), hbox((self._progress_label, 1), self.progress)
         self._foot = hbox((status, 1), hbox(1, *acts))
@@ -276,10 +276,10 @@ class AnalystWindow(QMainWindow):
 
 
 class TrialsColumn(QWidget):
-    """The trials, and the model's answers against their scores."""
+    """The trials, and the plot of prediction against score."""
 
     def __init__(self, tokens: Tokens, ask: Callable[[m.Ask], None], respond: Callable[[m.Respond], None]) -> None:
-        """Show no trials; `ask` takes the chosen row, `respond` the quantity that is compared with the score."""
+        """Show no trials; `ask` takes the chosen row, `respond` the quantity to compare with the score."""
         super().__init__()
         self._tokens, self._ask = tokens, ask
         self.list = row_list(tr("trials"))

@@ -1,4 +1,4 @@
-"""How the subject answers: on a line from 0 to 100, with a number, or with one of two; and how hard is pressed."""
+"""Fields for the subject's answer (a line from 0 to 100, a number, one of two), and the bar of the force."""
 
 from collections.abc import Callable
 
@@ -27,25 +27,25 @@ from daq_app.wording import POINTS, two_meanings, typed_number
 from sessions.plan.plan import Hand
 from sessions.run.steps import Event, Scored
 
-_REACH = 12.0  # above and below the line that counts as touching it [mm]
+_REACH = 12.0  # above and below the line, within which a touch counts [mm]
 MARK = 10.0  # height of the mark [mm]
 
 _KEYS = {
     Qt.Key.Key_Left: -STEP, Qt.Key.Key_Down: -STEP, Qt.Key.Key_Right: STEP, Qt.Key.Key_Up: STEP,
     Qt.Key.Key_PageDown: -LEAP, Qt.Key.Key_PageUp: LEAP, Qt.Key.Key_Home: -100.0, Qt.Key.Key_End: 100.0,
 }  # fmt: skip
-_NUMBER = QRegularExpression(rf"\p{{Nd}}{{0,9}}([{POINTS}]\p{{Nd}}{{0,9}})?")  # what can be typed of one, in any script
+_NUMBER = QRegularExpression(rf"\p{{Nd}}{{0,9}}([{POINTS}]\p{{Nd}}{{0,9}})?")  # typed text, in digits of any script
 _LARGE = 36  # type of the number [device-independent pixels]
 _BUTTON_TYPE = 24  # type of the buttons
 _WIDE, HIGH = 220, 96  # a button, at least
-FULL = 5.0  # of the bar [N]
-AVERAGING_TIME = 0.1  # the mean over this time is shown: an eye follows it, and noise does not move it [s]
+FULL = 5.0  # force at the end of the bar [N]
+AVERAGING_TIME = 0.1  # of the force shown: short enough to follow, long enough to suppress noise [s]
 
 
 class ScoreLine(QAbstractSlider):
-    """Takes mouse, touch, pen and keyboard alike; every position is kept with its time.
+    """Accepts mouse, touch, pen and keyboard; keeps every position with its time.
 
-    Read from right to left, 0 is at the right end; arrows move as they point. A slider to assistive technology.
+    In a right-to-left language 0 is at the right end; arrows move in their direction. A slider to assistive technology.
     """
 
     changed = Signal()
@@ -69,12 +69,12 @@ class ScoreLine(QAbstractSlider):
         self._resize()
 
     def speak(self, translate: Translate) -> None:
-        """Be named in another language to screen readers."""
+        """Set the language of the name for screen readers."""
         self._translate = translate
         self._name()
 
     def set_pixels_per_mm(self, pixels: float) -> None:
-        """Be as long as `LENGTH` says on a screen with `pixels` device-independent pixels a millimetre."""
+        """Set the length to `LENGTH` on a screen with `pixels` device-independent pixels per millimetre."""
         if pixels != self._pixels_per_mm:
             self._pixels_per_mm = pixels
             self._resize()
@@ -84,7 +84,7 @@ class ScoreLine(QAbstractSlider):
         return self.answer.score is not None
 
     def begin(self, end_labels: tuple[str, str], ticks: int = 0) -> None:
-        """Begin another answer, with an empty line between these ends, and ticks where a protocol asks for them."""
+        """Begin a new answer, with an empty line between these ends, and the protocol's ticks."""
         self._end_labels, self._ticks = end_labels, ticks
         self._take(Answer())
 
@@ -92,7 +92,7 @@ class ScoreLine(QAbstractSlider):
         return self.answer.release().judgement(hand)
 
     def point_at(self, position: float) -> QPointF:
-        """Return where a position from 0 to 100 lies in the widget."""
+        """Return the point in the widget of a position from 0 to 100."""
         line, along = self._line(), position / 100.0
         return QPointF(line.left() + (1.0 - along if self.isRightToLeft() else along) * line.width(), line.center().y())
 
@@ -101,7 +101,7 @@ class ScoreLine(QAbstractSlider):
         return QSize(round((LENGTH + MARK) * scale), round(2 * _REACH * scale))
 
     def event(self, event: QEvent) -> bool:
-        """Take touches; Qt makes mouse events only of those that nobody takes."""
+        """Accept touches; Qt converts only unaccepted ones to mouse events."""
         if isinstance(event, QTouchEvent) and event.points():
             self._touch(event, event.points()[0].position())
             event.accept()
@@ -128,7 +128,7 @@ class ScoreLine(QAbstractSlider):
         self._take(self.answer.step(self._now(), step))
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Move nothing: a wheel is turned by mistake."""
+        """Ignore the wheel, which is turned by mistake."""
         event.ignore()
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -163,7 +163,7 @@ class ScoreLine(QAbstractSlider):
                 self._take(self.answer.release())
 
     def _move(self, value: int) -> None:
-        """Take a value that assistive technology sets."""
+        """Take a value set by assistive technology."""
         if value != round(self.answer.score or 0.0):
             self._take(self.answer.press(self._now(), float(value), "keyboard").release())
 
@@ -177,7 +177,7 @@ class ScoreLine(QAbstractSlider):
         self.changed.emit()
 
     def _name(self) -> None:
-        """Say to screen readers what the line is, and where the answer lies."""
+        """Update the name and the position of the answer for screen readers."""
         (low, high), score = self._end_labels, self.answer.score
         self.setAccessibleName(self._translate(Text.LINE).format(low=low, high=high))
         state = self._translate(Text.UNANSWERED if score is None else Text.ANSWERED)
@@ -229,7 +229,7 @@ class _Field(QWidget):
 
 
 class NumberField(_Field):
-    """Takes a number above 0; a comma is a point, but where it may group thousands."""
+    """Takes a number above 0; a comma is a decimal mark unless it may group thousands."""
 
     def __init__(self, now: Callable[[], float]) -> None:
         super().__init__(now)
@@ -249,7 +249,7 @@ class NumberField(_Field):
 
     @property
     def two_meanings(self) -> tuple[str, str] | None:
-        """Return how a number whose mark may group thousands would be typed without and with a fraction."""
+        """Return both readings of a number whose mark may group thousands, without and with a fraction; else None."""
         return two_meanings(self.field.text(), self.point)
 
     def _type(self, text: str) -> None:
@@ -257,11 +257,11 @@ class NumberField(_Field):
 
 
 class ChoiceOfTwo(_Field):
-    """Two buttons of the same size; the one that is chosen stays pressed."""
+    """Two buttons of the same size; the chosen one stays pressed."""
 
     def __init__(self, now: Callable[[], float]) -> None:
         super().__init__(now)
-        self._pointer: Device = "mouse"  # that pressed a button last
+        self._pointer: Device = "mouse"  # of the last press
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(Text.OF_TWO)
         self.first = self._button(Text.FIRST, "first")
@@ -276,7 +276,7 @@ class ChoiceOfTwo(_Field):
             choice.setAccessibleName(text)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Choose with 1 and 2, or the arrows: the first stands where reading begins."""
+        """Choose with 1 and 2, or the arrows: the first is on the side where reading begins."""
         backward, forward = Qt.Key.Key_Left, Qt.Key.Key_Right
         if self.isRightToLeft():
             backward, forward = forward, backward
@@ -287,7 +287,7 @@ class ChoiceOfTwo(_Field):
             super().keyPressEvent(event)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Note what presses a button: a click itself does not tell."""
+        """Note the device that presses a button, which a click does not report."""
         if event.type() == QEvent.Type.MouseButtonPress and isinstance(event, QMouseEvent):
             self._pointer = _device(event)
         return False
@@ -297,7 +297,7 @@ class ChoiceOfTwo(_Field):
         choice.installEventFilter(self)
         choice.setCheckable(True)
         choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        # In a sheet of its own: the window's sets the height of every button.
+        # In a style sheet of its own, because the window's sets the height of every button.
         size = f"min-width: {px(_WIDE)}px; min-height: {px(HIGH)}px;"
         choice.setStyleSheet(f"font-size: {px(_BUTTON_TYPE)}px; {size}")
         return choice
@@ -309,7 +309,7 @@ class ChoiceOfTwo(_Field):
 
 
 def newest_force(trace: LiveTrace) -> float:
-    """Return the normal force of the last moment [N]; 0 where nothing is known."""
+    """Return the present normal force [N]; 0 if it is unknown."""
     newest = trace.newest
     if newest is None:
         return 0.0
@@ -320,7 +320,7 @@ def newest_force(trace: LiveTrace) -> float:
 
 
 class PressBar(QWidget):
-    """A bar from no force, where reading begins, to `FULL`; no number, so that nobody aims at one."""
+    """A bar from no force, on the side where reading begins, to `FULL`; no number, so that nobody aims at one."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -329,9 +329,9 @@ class PressBar(QWidget):
         self.setFixedHeight(px(6 * GRID))
 
     def show_force(self, trace: LiveTrace) -> None:
-        """Show the normal force of the last moment; an empty bar where nothing is known."""
+        """Show the present normal force; an empty bar if it is unknown."""
         force = newest_force(trace)
-        if abs(force - self._force) * self.width() > FULL:  # a pixel
+        if abs(force - self._force) * self.width() > FULL:  # more than a pixel
             self._force = force
             self.update()
 

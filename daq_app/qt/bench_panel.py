@@ -1,4 +1,4 @@
-"""The bench: which transducer, whether it is well, how far it is loaded; or, where there is little room, its lamps."""
+"""The bench: transducer, health and loads; or, if space is short, its lamps."""
 
 from collections.abc import Callable
 
@@ -32,7 +32,7 @@ SHOWN_COUNTERS = tr_noop(
 )
 
 _FIELDS = tr_noop(("serial", "calibration", "rate", "tare", "drift"))
-SPOKEN_NAMES = {"tare": tr_noop("mean of the zero"), "drift": tr_noop("drift of the zero")}  # captions at length
+SPOKEN_NAMES = {"tare": tr_noop("mean of the zero"), "drift": tr_noop("drift of the zero")}  # full captions
 
 
 class BenchPanel(Panel):
@@ -45,7 +45,7 @@ class BenchPanel(Panel):
         self._lamp = Lamp(tr("transducer"))
         self._lamp_label = label(tr("not connected"), wrap=True)
         self._fields = {name: label("–", wrap=True) for name in _FIELDS}
-        self._fields["tare"].setProperty("role", "quiet")  # three lines that nobody reads from afar
+        self._fields["tare"].setProperty("role", "quiet")  # three lines that need not be read from afar
         self._life = {name: label("–", wrap=True) for name in HEALTH_NAMES}
         self._name = label("", "title", wrap=True)
         self._counters = {name: label("0") for name in SHOWN_COUNTERS}
@@ -55,8 +55,8 @@ class BenchPanel(Panel):
         self._choice = choice(tr("transducer to connect: choose one, or type its address"))
         self._choice.setEditable(True)
         self._choice.setLineEdit(EntryLine(lambda: self._leave(connecting=True), self._leave))
-        self._choice.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)  # an address is no device until it answers
-        self._choice.setCompleter(None)  # pyrefly: ignore[bad-argument-type]  what is typed stays what it is
+        self._choice.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)  # only an address that answers is a device
+        self._choice.setCompleter(None)  # pyrefly: ignore[bad-argument-type]  no completion
         self.search = button(tr("Search"), tr("search for transducers"), search)
         self.connect_button = button(tr("Connect"), tr("connect the chosen transducer"), self.connect_choice)
         self.tare = button(tr("Zero T"), tr("measure the zero of the bench"), lambda: send(Tare()))
@@ -94,7 +94,7 @@ class BenchPanel(Panel):
         self.acknowledge.setEnabled(view.can_acknowledge)
 
     def connect_choice(self) -> None:
-        """Connect what is chosen or typed, or disconnect what is connected."""
+        """Connect the chosen or typed address, or disconnect the transducer."""
         view = self._view
         if view is not None and view.connect is not None:
             self._send(view.connect)
@@ -126,7 +126,7 @@ class BenchPanel(Panel):
 
     def _show_begin(self) -> None:
         if (typed_in := self._choice.lineEdit()) is not None:
-            typed_in.setCursorPosition(0)  # of an address that is too long the kind of transducer is seen
+            typed_in.setCursorPosition(0)  # the beginning of a long address shows the kind of transducer
 
     def _build(self) -> QWidget:
         inside, fields = QWidget(), self._fields
@@ -155,7 +155,7 @@ class BenchPanel(Panel):
 
 
 def show_connecting(push: QPushButton, view: BenchView) -> None:
-    """Show what a press connects or disconnects, where it can."""
+    """Label the button Connect or Disconnect, and enable it if that is possible."""
     push.setText(tr("Connect") if view.lamp == "off" else tr("Disconnect"))
     push.setAccessibleName(tr("{act} the transducer", act=push.text()))
     push.setEnabled(view.lamp == "off" or view.connect is not None)
@@ -181,9 +181,9 @@ class BenchStrip(Panel):
 
 
 class LoadBar(QWidget):
-    """How far one axis is loaded now, and the most it was loaded since somebody acknowledged it."""
+    """The present load of one axis, and its maximum since somebody acknowledged it."""
 
-    NAME, NOISE = 86, 104  # widths of the words beside the bar, before the font's scale
+    NAME, NOISE = 86, 104  # widths of the words next to the bar, before the font's scale
 
     def __init__(self, name: str) -> None:
         super().__init__()

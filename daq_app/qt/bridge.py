@@ -1,4 +1,4 @@
-"""The one crossing between the recorder and the window: what comes is folded, what is done is sent."""
+"""The only connection between recorder and window: it folds reports into the state and sends acts."""
 
 import threading
 import time
@@ -23,31 +23,31 @@ from daq_app.window.view import View, derive_view
 from drivers.catalog import reachable
 from sessions.plan.plan import Frame
 
-_FRAME = 16  # between two looks at the recorder [ms]: 60 a second
-AFTER_OPENING = 1500  # what is not needed at once waits until the window stands [ms]
-BEGINNING = (m.Connect, m.StartSession, m.ResumeSession)  # requests for which another recorder is started
-_TICK = 0.1  # between two looks at the clock, for texts with an age [s]
+_FRAME = 16  # between two polls of the recorder [ms]: 60 a second
+AFTER_OPENING = 1500  # delay of work that is not needed to open the window [ms]
+BEGINNING = (m.Connect, m.StartSession, m.ResumeSession)  # requests that start a new recorder if there is none
+_TICK = 0.1  # between two ticks, for texts with an age [s]
 
 
 class Client(Protocol):
-    """The recorder as the window sees it."""
+    """The window's interface to the recorder."""
 
     def send(self, request: Request) -> None: ...
     def poll(self) -> tuple[Report, ...]: ...
     def close(self) -> None: ...
 
     def leave(self) -> None:
-        """Let go of it: a session in hand gets an end from which it can be resumed."""
+        """Disconnect: a current session gets an end from which it can be resumed."""
 
 
 class Bridge(QObject):
-    """Holds the window's one state. Everything that changes it passes through `send` or `poll`."""
+    """Holds the window's one state. Every change passes through `send` or `poll`."""
 
-    changed = Signal(object)  # View, whenever it is another one
-    frame = Signal()  # readings may have come: time to draw
+    changed = Signal(object)  # View, whenever it has changed
+    frame = Signal()  # time to draw: there may be new readings
 
     def __init__(self, client: Client, start: Callable[[], Client]) -> None:
-        """Speak to a recorder; `start` makes another should it go."""
+        """Connect to a recorder; `start` makes another if it goes."""
         super().__init__()
         self._client, self._start = client, start
         self._ticked = -1.0
@@ -67,7 +67,7 @@ class Bridge(QObject):
         return self.state.session is not None and not self.state.session.is_over
 
     def connecting(self, uri: str) -> None:
-        """Know that the recorder was asked to connect a transducer already."""
+        """Note that the recorder has already been told to connect a transducer."""
         self._fold(m.Connect(uri))
 
     def begin(self) -> None:
@@ -76,7 +76,7 @@ class Bridge(QObject):
         QTimer.singleShot(AFTER_OPENING, self.model.prepare)
 
     def end(self) -> None:
-        """Stop looking, and let the recorder end; a session in hand can be resumed."""
+        """Stop polling, and let the recorder end; a current session can be resumed."""
         self._timer.stop()
         self.model.close()
         if self.recording:
@@ -89,10 +89,10 @@ class Bridge(QObject):
         return time.monotonic() + self.session_offset
 
     def send(self, message: Message) -> None:
-        """Do what somebody asked for: fold it, and tell the recorder where it is for it."""
+        """Carry out a message: fold it, and if it is a request or an event, send it to the recorder."""
         self._fold(message)
         if isinstance(message, REQUESTS) and (self.state.exit_reason is None or isinstance(message, BEGINNING)):
-            if self.state.exit_reason is not None:  # another recorder takes its place
+            if self.state.exit_reason is not None:  # a new recorder replaces it
                 self._client.close()
                 self._client = self._start()
                 self._fold(m.Gone(True, ""))
@@ -100,7 +100,7 @@ class Bridge(QObject):
         self._show()
 
     def search(self) -> None:
-        """Look for transducers, without holding up the window."""
+        """Search for transducers without blocking the window."""
         self.send(Searching())
         self._look_up(lambda: DevicesFound(reachable()))
 
@@ -112,7 +112,7 @@ class Bridge(QObject):
         for report in merge_live(self._client.poll()):
             try:
                 self._take(report)
-            except Exception as error:  # noqa: BLE001  what one report cannot be used for must not cost the others
+            except Exception as error:  # noqa: BLE001  a failure with one report must not lose the others
                 self.report_drawing_failure(error)
         with suppress(Empty):
             while True:
@@ -123,7 +123,7 @@ class Bridge(QObject):
         self.frame.emit()
 
     def report_drawing_failure(self, error: Exception) -> None:
-        """Say that a picture could not be drawn; nothing else is touched by it."""
+        """Report that a picture could not be drawn; nothing else is affected."""
         sentence = f"{type(error).__name__}: {str(error).strip().partition(chr(10))[0]}"
         if self.state.drawing_error != sentence:
             self._fold(DrawingFailed(sentence))
@@ -148,10 +148,10 @@ class Bridge(QObject):
         bench = self.state.bench
         if bench.info is not None and (isinstance(report, m.Device | m.Tared) or bench.peak.overloads != overloads):
             serial = bench.info.serial
-            self._look_up(lambda: LifeKnown(serial, life_of(serial)))  # from a file that grows for years
+            self._look_up(lambda: LifeKnown(serial, life_of(serial)))  # from a file that may be large
 
     def _look_up(self, read: Callable[[], Message]) -> None:
-        """Look something up in a thread, which does not hold up the window."""
+        """Read in a thread, without blocking the window; the result is folded."""
         threading.Thread(target=lambda: self._from_threads.put(read()), daemon=True).start()
 
     def _settle(self, judgement: Judged) -> None:
@@ -173,6 +173,6 @@ class Bridge(QObject):
             self.changed.emit(view)
 
     def _frame(self) -> Frame:
-        """Return how the transducer lies to the face: as the session states it, or the bench knows it."""
+        """Return the transducer's orientation to the face, from the session or the bench."""
         session = self.state.session
         return self.state.bench.frame or Frame() if session is None or session.is_over else session.plan.frame

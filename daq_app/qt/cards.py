@@ -1,4 +1,4 @@
-"""Cards of the page of a new session: a frame, the transducer, the subject's screen, and what was cut short."""
+"""Cards of the page of a new session: a frame, the transducer, the subject's screen, and unfinished sessions."""
 
 import threading
 from collections.abc import Callable
@@ -55,7 +55,7 @@ class CardFrame(Panel):
         fill(self._fields, *fields)
 
     def show_card(self, card: Card) -> None:
-        """Show whether the card is ready, and its line; nobody is blamed before Start was asked for."""
+        """Show whether the card is ready, and its line; nothing is marked wrong before Start is pressed."""
         if card == self._card:
             return
         self._card = card
@@ -66,12 +66,12 @@ class CardFrame(Panel):
         self.setAccessibleName(f"{tr(self._name)}: {state}. {card.text}".strip())
 
     def insist(self) -> None:
-        """Mark the line as what keeps the session from beginning."""
+        """Mark the line as the reason why the session cannot begin."""
         regrade(self.message, "wrong")
 
 
 class CutShort(Panel):
-    """Lists the sessions that can go on; without one it is not seen."""
+    """Lists the sessions that can be resumed; hidden if there are none."""
 
     _new_list = Signal(object)  # from a thread
 
@@ -80,7 +80,7 @@ class CutShort(Panel):
         self._items: tuple[UnfinishedSession, ...] = ()
         self.setProperty("grade", "look")
         self._sessions = choice(tr("sessions that were cut short"))
-        self._description = label("", wrap=True)  # whole, however narrow the list is
+        self._description = label("", wrap=True)  # complete, even if the list is narrow
         self._sessions.currentTextChanged.connect(partial(set_text, self._description))
         name = tr("go on with the session that was cut short")
         self.go_on = button(tr("Go on with it"), name, lambda: send(ResumeSession(self._sessions.currentData())))
@@ -90,11 +90,11 @@ class CutShort(Panel):
         self.show_sessions(())
 
     def look_in(self, folder: Path) -> None:
-        """Look for such sessions in a folder, without holding up the window."""
+        """Search a folder for such sessions without blocking the window."""
 
         def look() -> None:
             sessions = unfinished_sessions(folder)
-            with suppress(RuntimeError):  # the page is gone by now
+            with suppress(RuntimeError):  # the page may be gone
                 self._new_list.emit(sessions)
 
         threading.Thread(target=look, daemon=True).start()
@@ -112,7 +112,7 @@ class CutShort(Panel):
 
 
 class TransducerRow(QWidget):
-    """Two buttons and a few lines of words; `act` does what a button stands for."""
+    """Two buttons and a few lines of text; `act` carries out the action of a button."""
 
     def __init__(self, act: Callable[[str], None]) -> None:
         super().__init__()
@@ -128,18 +128,18 @@ class TransducerRow(QWidget):
 
 
 class ScreenFields(QWidget):
-    """What stands on the card of the subject's screen, whether a second screen or a tablet."""
+    """Content of the card of the subject's screen, for a second screen or a tablet."""
 
     def __init__(self, act: Callable[[str], None], form: Callable[[], SessionForm]) -> None:
-        """Show nothing yet; `act` does what a button stands for, `form` is read when something has changed."""
+        """Show nothing yet; `act` carries out the action of a button, `form` is read after each change."""
         super().__init__()
         self._form = form
-        self.status = ""  # the length of the line, and characters that no font here has
-        self.problem = ""  # why the subject's page is on no tablet, where it should be
+        self.status = ""  # the length of the line, and characters without a font
+        self.problem = ""  # why the subject's page is not on a tablet, if it should be
         self._line_words = ""
         self._size = QSize(1000, 640)  # of the subject's window
         self.language = choice(tr("language that the subject reads"))
-        self._wish = ENGLISH  # language that somebody chose, also while a protocol does not have it
+        self._wish = ENGLISH  # chosen language, kept even while a protocol lacks it
         self.thumbnail = Thumbnail()
         name = tr("check the subject's line with a ruler")
         self._ruler = button(tr("Check with a ruler  Ctrl+M"), name, lambda: act("ruler"))
@@ -158,18 +158,18 @@ class ScreenFields(QWidget):
         self.show_form()
 
     def show_tablet(self, status: str, problem: str, picture: bytes) -> None:
-        """Say how the tablet is reached; why no session can begin; its address for a camera (PNG, or empty)."""
+        """Show how to reach the tablet, why no session can begin, and its address for a camera (PNG, or empty)."""
         self._line_words, self.problem = status, problem
         pixmap = QPixmap()
         pixmap.loadFromData(picture)
         self.camera.setPixmap(pixmap)
         self.camera.setVisible(bool(picture))
-        self._ruler.hide()  # there is one on the tablet's page
+        self._ruler.hide()  # the tablet's page has its own
         self._new_code.show()
         self.show_form()
 
     def offer_languages(self) -> None:
-        """Offer the languages of the form's protocol, and choose the one that was wished for where it is among them."""
+        """Offer the languages of the form's protocol, and select the preferred one if it is among them."""
         codes, _ = subject_texts(self._form())
         if list(codes) != [self.language.itemData(index) for index in range(self.language.count())]:
             if self.language.findData(self._wish) >= 0:
@@ -180,12 +180,12 @@ class ScreenFields(QWidget):
             self.language.setCurrentIndex(max(self.language.findData(self._wish), 0))
 
     def show_form(self) -> None:
-        """Show the page of the form, and say which of its characters no font here has."""
+        """Show the page of the form, and name its characters without a font."""
         form = self._form()
         self.thumbnail.show_form(form, self._size)
         self.status = self._line_words
         if not self._new_code.isHidden():
-            return  # the tablet has fonts of its own
+            return  # the tablet has its own fonts
         _, texts = subject_texts(form)
         translate = translator(form.language or ENGLISH)
         if lost := missing_glyphs([*texts, *map(translate, SubjectText)], self.font()):

@@ -1,4 +1,4 @@
-"""The course of a session: the plan with what is done, in hand and coming, and what else can be done now."""
+"""The plan of a session with finished, current and coming trials, and further actions."""
 
 from collections.abc import Callable
 from functools import partial
@@ -17,27 +17,27 @@ from daq_app.window.view_course import Button, CourseView, PlanRow
 from daq_app.wording import tr
 from sessions.run import steps
 
-MESSAGES = {"redo": steps.Redo, "skip": steps.Skip, "note": steps.Note, "end": steps.Abort}  # that take a text
-ACTS = ("skip", "redo", "pause", "note", "no answer", "end")  # that have a button
+MESSAGES = {"redo": steps.Redo, "skip": steps.Skip, "note": steps.Note, "end": steps.Abort}  # messages with a text
+ACTS = ("skip", "redo", "pause", "note", "no answer", "end")  # actions with a button
 _DESCRIPTIONS = {name: key.description for key in KEYS for name in (key.key, key.act)}
-_ROOMY = 560  # at which a picture of the subject's page has room beneath the plan, before the font's scale [px]
+_ROOMY = 560  # height from which a picture of the subject's page fits below the plan, before the font's scale [px]
 
 
 class CoursePanel(Panel):
-    """The left of the experimenter's window while a session is in hand."""
+    """The left of the experimenter's window during a session."""
 
     def __init__(self, send: Callable[[Message], None]) -> None:
         super().__init__(tr("course of the session"))
         self._send = send
         self._view: CourseView | None = None
         self._act = ""
-        self._question_text = ""  # the question that stands over the line
+        self._question_text = ""  # the question above the line
         self.plan = row_list(tr("plan: trials done, in hand and coming"))
         self.buttons = {act: button("", tr(_DESCRIPTIONS[act]), partial(self.ask, act), "small") for act in ACTS}
         self.line = EntryLine(self._keep, self.leave)
         self.line.setAccessibleName(tr("reason or note"))
         self._question = label("", wrap=True)
-        self._question.setMinimumHeight(2 * self._question.fontMetrics().lineSpacing())  # nothing moves for a long one
+        self._question.setMinimumHeight(2 * self._question.fontMetrics().lineSpacing())  # room for a long question
         acts, columns = QWidget(), 3 if type_scale() <= 1.0 else 2
         grid = QGridLayout(acts)
         grid.setContentsMargins(0, 0, 0, 0)
@@ -75,7 +75,7 @@ class CoursePanel(Panel):
                 widget.setEnabled(entry.enabled)
 
     def ask(self, act: str) -> None:
-        """Ask for the reason of a redo or skip, or for a note; a redo whose reason is known is sent at once."""
+        """Ask for the reason of a redo or skip, or for a note; a redo with a known reason is sent immediately."""
         if self._view is None or not (entry := self._view.buttons[act]).enabled:
             return
         if entry.sends is not None:
@@ -89,7 +89,7 @@ class CoursePanel(Panel):
         self.line.setFocus()
 
     def _name_question(self, entry: Button, text: str) -> None:
-        """Show what is asked over the line, and on its button what Enter does."""
+        """Show the question above the line, and the action of Enter on its button."""
         self._question_text = entry.question
         set_text(self._question, text)
         self._do.setText(f"{entry.label}  {tr('Enter')}")
@@ -127,11 +127,11 @@ class CoursePanel(Panel):
         self._keep_in_sight()
 
     def _keep_in_sight(self) -> None:
-        """Have the trial in hand among the rows that are seen."""
+        """Scroll to the current trial."""
         kinds = [] if self._view is None else [row.kind for row in self._view.rows]
         if "current" in kinds and self.plan.count() == len(kinds):
             self.plan.scrollToItem(self.plan.item(kinds.index("current")), QListWidget.ScrollHint.EnsureVisible)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         self.mirror.open.set_room(self.height() >= px(_ROOMY, most=1.4))
-        QTimer.singleShot(0, self, self._keep_in_sight)  # once the plan has its new height
+        QTimer.singleShot(0, self, self._keep_in_sight)  # after the plan has its new height

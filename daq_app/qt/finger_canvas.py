@@ -1,4 +1,4 @@
-"""A state of the model's finger that is looked at: moved, zoomed, probed, and cut by a line."""
+"""An interactive picture of the model's finger: moved, zoomed, probed, and cut by a line."""
 
 from math import ceil
 from typing import Any
@@ -20,14 +20,14 @@ _HELP = tr_noop(
     "By keys, Shift and arrows move its end, Ctrl and arrows its beginning, and Del takes it away."
 )
 SHADES = 64
-ZOOM = 1.25  # of a key [-]: three of them double the picture
-_STEP = 0.1  # of the picture's width that an arrow key moves it
-END_STEP = 0.2  # of `_STEP`, by which an arrow key moves an end of a line
+ZOOM = 1.25  # zoom factor of a key: three presses double the picture [-]
+_STEP = 0.1  # step of the picture by an arrow key, relative to its width [-]
+END_STEP = 0.2  # step of a line's end by an arrow key, relative to `_STEP` [-]
 _LEAST = 110  # height of the finger, before the font's scale [px]
 BAR_LINES = 3.5  # of text: height of the colour bar
-LEAST_LINES = 2.2  # of words over a finger: with fewer of them the picture stays where it is
-NEAREST, _FARTHEST = 0.2, 500.0  # least and greatest width that is shown [mm]
-# Black lines lie on the colours: magma begins a fifth above its dark end, and zero of a signed field is pale.
+LEAST_LINES = 2.2  # room for text above a finger: shorter text does not move the picture
+NEAREST, _FARTHEST = 0.2, 500.0  # least and greatest width shown [mm]
+# Black lines are drawn on the colours: magma begins a fifth above its dark end, and zero of a signed field is pale.
 MAPS = {False: ("magma", 1.0, 0.2), True: ("CET-D1A", 0.0, 1.0)}
 LINE_KEYS = Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.ControlModifier
 _ARROWS = {
@@ -37,18 +37,18 @@ _ARROWS = {
 
 
 class Sight(QObject):
-    """Which part of the finger is looked at, and the line over it; canvases of one size share it."""
+    """The visible part of the finger, and the line over it; canvases of one size share it."""
 
     changed = Signal()
-    cut = Signal()  # a line was drawn or taken away
-    pointed = Signal(object)  # place under the pointer (x, y) [mm]; None where it left
+    cut = Signal()  # a line was drawn or removed
+    pointed = Signal(object)  # point under the pointer (x, y) [mm]; None once it left
 
     def __init__(self) -> None:
         super().__init__()
         self.region: QRectF | None = None  # [mm]; None: all of it
         self.line: Line | None = None
         self.draws_line = False  # the mouse draws a line in place of moving the picture
-        self.captions: tuple[str, ...] = ("",)  # over each finger
+        self.captions: tuple[str, ...] = ("",)  # above each finger
 
     def look_at(self, region: QRectF | None) -> None:
         """Show a part of the finger [mm]; None shows all of it."""
@@ -62,9 +62,9 @@ class Sight(QObject):
 
 
 class FingerCanvas(pg.GraphicsLayoutWidget):
-    """A picture of one frame in pyqtgraph's view box, with its colour bar under it."""
+    """A picture of one frame in pyqtgraph's view box, with its colour bar below."""
 
-    range_chosen = Signal(tuple)  # ends of the colours, as the bar's handles were left
+    range_chosen = Signal(tuple)  # ends of the colours, from the bar's handles
 
     def __init__(self, tokens: Tokens, sight: Sight | None = None) -> None:
         """Show nothing yet; canvases with the same `sight` move together."""
@@ -74,7 +74,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         self.frame: Frame | None = None
         self.look = Look(FIELD_CHOICES[0], (0.0, 1.0))
         self._caption = ""
-        self._fits: tuple[Frame, ...] = ()  # all of them are seen before anybody moves or zooms
+        self._fits: tuple[Frame, ...] = ()  # frames that fit into the initial view
         self._pointer: QPointF | None = None
         self._shades = {signed: _shades(*colour_map) for signed, colour_map in MAPS.items()}
         self.setBackground(tokens.surface)
@@ -92,7 +92,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         self._fit_region()
 
     def show_frame(self, frame: Frame | None, caption: str, look: Look, linked: tuple[Frame, ...] = ()) -> None:
-        """Show a state, and how; what was moved or zoomed stays so. Frames that are `linked` with it fit in too."""
+        """Show a state with a `look`, without changing the view. Frames that are `linked` with it fit in too."""
         fits = linked or (() if frame is None else (frame,))
         if frame is self.frame and fits == self._fits and (caption, look) == (self._caption, self.look):
             return
@@ -109,7 +109,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         self._probe()
 
     def view(self) -> View:
-        """Return where places of the finger lie on the canvas."""
+        """Return the view that maps points of the finger to the canvas."""
         region, plot_box = self._box.viewRect(), self._plot_rect()
         middle, per_mm = region.center(), plot_box.width() / region.width()
         return View(middle.x(), middle.y(), plot_box.center().x(), plot_box.center().y(), per_mm)
@@ -118,7 +118,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         return "" if self.frame is None else probe_text(self.frame, self.look.field, *position)
 
     def draw(self, painter: QPainter, heading: str) -> None:
-        """Draw what is shown on paper of the window's colour, with a `heading` such as SIMULATED over it, and end."""
+        """Draw the canvas on the window's background colour, with a `heading` such as SIMULATED above, and end."""
         above = self.size_with(heading).height() - self.height()
         painter.fillRect(QRectF(0, 0, self.width(), above), QColor(self._tokens.surface))
         painter.setFont(self._font)
@@ -185,7 +185,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
             event.ignore()
 
     def _move_end(self, key: Qt.Key, *, begins: bool) -> None:
-        """Move the beginning or the end of the line as an arrow key points; the first draws it from the middle."""
+        """Move the beginning or the end of the line by an arrow key; the first press draws it from the middle."""
         region = self._box.viewRect()
         line = self.sight.line or ((region.center().x(), region.center().y()),) * 2
         dx, dy = (END_STEP * step * region.width() for step in _ARROWS[key])
@@ -200,10 +200,10 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         self.sight.pointed.emit(position)
 
     def _fit_region(self) -> None:
-        """Show the part that is looked at, or all of it at the foot of the box."""
+        """Show the selected part, or all of it at the bottom of the box."""
         above, line = self._above(), QFontMetricsF(self._font).height()
         least = self._least * (1 if self.look.lost is None else 2)  # a marked place must differ from others
-        self.setMinimumSize(80, round(above + BAR_LINES * line) + least)  # two stand beside each other
+        self.setMinimumSize(80, round(above + BAR_LINES * line) + least)  # two fit next to each other
         self.ci.layout.setContentsMargins(0.0, above, 0.0, 0.0)
         axis: Any = self._bar.getAxis("bottom")
         width = QFontMetricsF(self._font).horizontalAdvance(self.look.field.axis)
@@ -213,7 +213,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
             boxes = np.array([whole_box(frame, self.look) for frame in self._fits])
             left, below = boxes.min(axis=0)[[0, 2]].tolist()
             right, high = boxes.max(axis=0)[[1, 3]].tolist()
-            room = max(box.height() - line - 2.0, 1.0)  # over a line of words under the tractions
+            room = max(box.height() - line - 2.0, 1.0)  # above a line of text below the tractions
             view = View.fit((left, right, below, high), 0.0, 0.0, box.width(), room)
             x0, x1, y0, y1 = view.visible(0.0, 0.0, box.width(), box.height())
             region = QRectF(x0, y0, x1 - x0, y1 - y0)
@@ -225,11 +225,11 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         return QRectF(self._box.mapRectToScene(self._box.rect()))
 
     def _above(self) -> float:
-        """Return the height of the words [pixel], the same over every finger."""
+        """Return the height of the text [pixel], the same above every finger."""
         return max(LEAST_LINES * QFontMetricsF(self._font).height(), *map(self._height_of, self.sight.captions))
 
     def _height_of(self, text: str) -> float:
-        """Return the height of words that are as wide as the canvas [pixel]."""
+        """Return the height of a text wrapped to the width of the canvas [pixel]."""
         box = QRectF(0.0, 0.0, self.width() - 8.0, 1.0)
         return QFontMetricsF(self._font).boundingRect(box, int(Qt.TextFlag.TextWordWrap), breakable(text)).height()
 
@@ -238,29 +238,29 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         line = QFontMetricsF(self._font).height()
         bar = pg.ColorBarItem(width=line - 4.0, orientation="h", colorMapMenu=False, **pens)
         style_axis(bar.getAxis("bottom"), self._tokens, self._font)
-        self.ci.layout.setRowFixedHeight(1, BAR_LINES * line)  # colours, ticks and the field's name keep their place
+        self.ci.layout.setRowFixedHeight(1, BAR_LINES * line)  # fixed room for colours, ticks and the field's name
         bar.hide()
         bar.sigLevelsChangeFinished.connect(lambda: self.range_chosen.emit(bar.levels()))
         return bar
 
 
 class _Box(pg.ViewBox):
-    """Moves and zooms the finger as every plot, true to scale; with Shift, or where lines are drawn, a drag is one."""
+    """Moves and zooms the finger like every plot, to scale; dragging with Shift, or in line mode, draws a line."""
 
     def __init__(self, sight: Sight) -> None:
         pg.ViewBox.__init__(self, lockAspect=True, enableMenu=False, defaultPadding=0.0)
         self._sight = sight
-        self.draws = False  # what is dragged is the end of a line
+        self.draws = False  # the drag moves the end of a line
         self.setLimits(minXRange=NEAREST, maxXRange=_FARTHEST)
         self.sigRangeChangedManually.connect(self._share_region)
 
     def zoom(self, factor: float) -> None:
-        """Show the finger `factor` times as large; its middle stays."""
+        """Enlarge the finger by `factor` about the centre."""
         self.scaleBy((1.0 / factor, 1.0 / factor))
         self._share_region()
 
     def move(self, dx: float, dy: float) -> None:
-        """Look further to the right and up, by parts of the width that is shown."""
+        """Move the view to the right and up, relative to the visible width."""
         width = self.viewRect().width()
         self.translateBy(x=dx * width, y=dy * width)
         self._share_region()

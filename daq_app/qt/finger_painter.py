@@ -13,27 +13,27 @@ from daq_app.qt.tokens import Tokens
 from daq_app.wording import tr, tr_noop
 from drivers.arrays import Array
 
-_ARROWS, _LONGEST = 22, 1.5  # tractions at most, and the longest of them [mm]
-TRACTIONS = _LONGEST + 0.4  # below the surface: the arrows, and the line of what the skin does [mm]
+_ARROWS, _LONGEST = 22, 1.5  # most traction arrows, and the longest of them [mm]
+TRACTIONS = _LONGEST + 0.4  # room below the surface for the arrows and the line of contact states [mm]
 _NEAR = (4.6, 4.4)  # half width and height above the surface of the close view [mm]
-_COARSE = 40.0  # area of a triangle on the screen above which it is shaded in four [pixel2]: its steps would be seen
+_COARSE = 40.0  # area of a triangle on the screen above which it is shaded in four, to hide its steps [pixel2]
 STYLES = {"slip": Qt.PenStyle.SolidLine, "cap": Qt.PenStyle.DashLine, "stick": Qt.PenStyle.DotLine}
 STATE_WORDS = {"slip": tr_noop("slips"), "cap": tr_noop("slips at the bound"), "stick": tr_noop("sticks")}
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """How a state is shown."""
+    """Display options of a state."""
 
     field: FieldChoice
-    range: Range  # where the colours begin and end, in the field's own unit
-    near: bool = False  # the contact alone
+    range: Range  # of the colours, in the field's own unit
+    near: bool = False  # the contact only
     mesh: bool = False
-    lost: tuple[float, float] | None = None  # a place that is marked [mm]
+    lost: tuple[float, float] | None = None  # a marked point [mm]
 
 
 def whole_box(frame: Frame, look: Look) -> Box:
-    """Return left, right, below and above of what is shown before anybody moves or zooms it [mm]."""
+    """Return left, right, below and above of the initial view [mm]."""
     if not look.near:
         x, y = frame.nodes[:, 0], frame.nodes[:, 1]
         return float(x.min()) - 0.5, float(x.max()) + 0.5, -TRACTIONS, float(y.max()) + 0.3
@@ -46,7 +46,7 @@ def whole_box(frame: Frame, look: Look) -> Box:
 
 @dataclass(frozen=True, slots=True)
 class FingerPainter:
-    """Paints one frame as a view shows it."""
+    """Paints one frame in a view."""
 
     painter: QPainter
     tokens: Tokens
@@ -100,7 +100,7 @@ class FingerPainter:
     def _paint_outlines(self) -> None:
         painter, ink = self.painter, QColor(self.tokens.text)
         for name, outline in self.frame.outlines.items():
-            # what lies on the tissue's colours is black in both themes: they are pale where most lines are
+            # lines on the tissue's colours are black in both themes, since the colours there are mostly pale
             painter.setPen(QPen(ink if name in ("skin", "bone") else QColor("black"), 1.4 if name == "skin" else 0.7))
             if name == "bone":
                 painter.setBrush(QColor(self.tokens.surface))
@@ -113,7 +113,7 @@ class FingerPainter:
         self._in_two(QPolygonF(self._to_screen(self.frame.patch)))
 
     def _name_bone(self, bone: QPolygonF, middle: QPointF) -> None:
-        """Write the bone's name where all of it lies on the bone: on the colours around it could not be read."""
+        """Write the bone's name only if it fits into the bone: it would be illegible on the colours around."""
         name = tr("bone")
         box = self.painter.fontMetrics().boundingRect(name).toRectF()
         box.moveCenter(middle)
@@ -131,13 +131,13 @@ class FingerPainter:
             self.painter.drawText(QRectF(point.x() - 9, point.y() - 9, 18, 18), Qt.AlignmentFlag.AlignCenter, name)
 
     def _in_two(self, polygon: QPolygonF) -> None:
-        """Draw a line black on white, to be seen on every colour."""
+        """Draw a line black on white, visible on every colour."""
         for colour, width in ((QColor("white"), 3.2), (QColor("black"), 1.4)):
             self.painter.setPen(QPen(colour, width))
             self.painter.drawPolyline(polygon)
 
     def _paint_contact(self, ground: float) -> None:
-        """Draw tractions as arrows that end where they act, and under them what each stretch of skin does."""
+        """Draw tractions as arrows that end at their points of action, and below them the skin's contact states."""
         painter, contact, ink = self.painter, self.frame.contact, QColor(self.tokens.text)
         touching = [i for i, state in enumerate(contact.state) if state != "open"]
         if not touching:

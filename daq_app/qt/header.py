@@ -1,4 +1,4 @@
-"""The top of the experimenter's window: whose session, the recording lamp, the banner, and what to do now."""
+"""The top of the experimenter's window: subject, recording lamp, banner, and the current step."""
 
 from collections.abc import Callable
 from time import monotonic
@@ -16,17 +16,17 @@ from daq_app.window.view import Banner, View
 from daq_app.window.view_course import Button
 from daq_app.wording import tr, tr_noop
 
-_ONE_ROW = 1100  # width in which subject and lamp stand beside each other, before the font's scale [px]
+_ONE_ROW = 1100  # width from which subject and lamp are in a row, before the font's scale [px]
 TWO_LINES = 4 * GRID  # of small type, before the font's scale [px]
 _ROOM = TARGET + 4  # height of the notice's line, a button and its margins, before the font's scale [px]
-_LEAST = 2 * GRID  # height of what to do now, where it has no words [px]
-LEGIBLE = 4.0  # s: some twenty words, read at five a second
+_LEAST = 2 * GRID  # height of the current step without text [px]
+LEGIBLE = 4.0  # to read some twenty words, at five a second [s]
 _STROKES = tr_noop({1: "stroke away from the subject", -1: "stroke towards the subject", 0: "no stroke asked for"})
 _MARKS = {"wrong": "■", "look": "▲"}  # before the sentence of a banner
 
 
 class Header(QWidget):
-    """Whose session it is, by which device and in which language, and whether it is simulated and being recorded."""
+    """Shows subject, device, language, and whether the session is simulated and being recorded."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -34,9 +34,9 @@ class Header(QWidget):
         self._language = label("", "quiet")
         for wrapped in (self._heading, self._device):
             policy = wrapped.sizePolicy()
-            policy.setHorizontalPolicy(QSizePolicy.Policy.Ignored)  # they share the room there is
+            policy.setHorizontalPolicy(QSizePolicy.Policy.Ignored)  # they share the available width
             wrapped.setSizePolicy(policy)
-        self._device.setMinimumHeight(px(TWO_LINES))  # what is below stays in place when the device says more
+        self._device.setMinimumHeight(px(TWO_LINES))  # parts below stay in place when the device's text grows
         self._simulated = label(tr("SIMULATED"), "simulated")
         self._lamp = Lamp(tr("recording"))
         self._recording_label = label(tr("not recording"), "title")
@@ -50,7 +50,7 @@ class Header(QWidget):
 
     def show_view(self, view: View) -> None:
         set_text(self._heading, view.heading)
-        lamp_text = view.bench.lamp_text.replace(" ", "\u00a0")  # a line ends after the name
+        lamp_text = view.bench.lamp_text.replace(" ", "\u00a0")  # a line may break only after the name
         set_text(self._device, f"{view.bench.name}: {lamp_text}")
         set_text(self._language, name_of(view.subject.language), tr("language that the subject reads"))
         self._simulated.setVisible(view.simulated is not None)
@@ -58,7 +58,7 @@ class Header(QWidget):
         self._simulated.setAccessibleName(view.simulated or tr("nothing is simulated"))
         self._lamp.show_grade(view.lamp.grade, view.lamp.text)
         set_text(self._recording_label, view.lamp.text, grade="wrong" if view.lamp.grade == "wrong" else "")
-        # All figures are as wide, but some lean beyond their place, which a label allows for.
+        # All figures have the same width, but some extend beyond it, which a label allows for.
         self._recording_label.setMinimumWidth(self._recording_label.fontMetrics().horizontalAdvance(view.lamp.text) + 2)
         set_text(self._age, view.lamp.age)
 
@@ -67,13 +67,13 @@ class Header(QWidget):
 
 
 class Notice(Panel):
-    """One line that is always there: empty, a sentence, or a banner that stays until its cause is gone."""
+    """One permanent line: empty, a sentence, or a banner that stays until its cause is gone."""
 
     def __init__(self, send: Callable[[Message], None]) -> None:
         super().__init__("", "banner")
         self._send, self._collapsible = send, False
         self._banner: Banner | None = None
-        self.warning = ""  # what was answered to somebody, until the session moves on or says something itself
+        self.warning = ""  # reply to an act, until the session advances or has its own message
         self._legible_until = 0.0  # of the monotonic clock
         self._topic: object = None
         self._step = ""
@@ -84,7 +84,7 @@ class Notice(Panel):
         hbox((self._label, 1), self._button, on=self, margins=(2 * GRID, 2, GRID, 2))
 
     def show_view(self, banner: Banner | None, notice: str, step: str = "") -> None:
-        """Show a banner and a warning of this step of the session, or else the last message."""
+        """Show a banner and a warning of this step, or else the last message."""
         topic = (banner is None, notice)
         if topic != self._topic or (step != self._step and monotonic() >= self._legible_until):
             self.warning, self._topic, self._step = "", topic, step
@@ -106,13 +106,13 @@ class Notice(Panel):
             self.setVisible(bool(text))
 
     def set_collapsible(self, collapsible: bool) -> None:
-        """Keep the line's place while it is empty; or give it up, where there is no room to keep."""
+        """Hide the empty line if `collapsible`, to save space; else keep its room."""
         self._collapsible = collapsible
         self.setMinimumHeight(0 if collapsible else px(_ROOM))
         self.setVisible(not collapsible or bool(self._label.text()))
 
     def warn(self, sentence: str) -> None:
-        """Answer somebody; a sentence stays long enough to be read, also where a simulated subject goes on at once."""
+        """Show a reply long enough to be read, even if a simulated subject continues immediately."""
         self.warning = sentence
         self._legible_until = monotonic() + LEGIBLE if sentence else 0.0
         self._show(self._banner, sentence)
@@ -123,7 +123,7 @@ class Notice(Panel):
 
 
 class ToDo(Panel):
-    """What to do now, and the one button that does it."""
+    """The current step, and its button."""
 
     def __init__(self, primary: Callable[[], None], review: Callable[[], None]) -> None:
         super().__init__(tr("what to do now"))
@@ -150,7 +150,7 @@ class ToDo(Panel):
             self.primary.setAccessibleName(f"{primary.label}: {sentence}")
             self.primary.setEnabled(primary.enabled)
         self.primary.setVisible(primary is not None)
-        if self.isVisible() and not self._small:  # what is below stays in place when a shorter sentence comes
+        if self.isVisible() and not self._small:  # parts below stay in place when the sentence gets shorter
             tallest = max(self.sentence.minimumHeight(), self.sentence.heightForWidth(self.sentence.width()))
             self.sentence.setMinimumHeight(tallest)
 
@@ -159,7 +159,7 @@ class ToDo(Panel):
             self.sentence.setMinimumHeight(_LEAST)
 
     def show_small(self, small: bool, *, stacked: bool) -> None:
-        """Use smaller type where there is little room, and one button below the other where it is narrow."""
+        """Use smaller type if space is short, and put one button below the other if `stacked`."""
         directions = QBoxLayout.Direction
         self._buttons.setDirection(directions.BottomToTop if stacked else directions.LeftToRight)
         if small != self._small:
@@ -170,7 +170,7 @@ class ToDo(Panel):
 
 
 class Arrow(QWidget):
-    """Which way the stroke goes, as somebody facing the subject's finger from behind sees it: up is away."""
+    """The direction of the stroke, as seen from behind the subject's finger: up is away."""
 
     def __init__(self) -> None:
         super().__init__()

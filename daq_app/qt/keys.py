@@ -1,4 +1,4 @@
-"""The keys of the windows, the experimenter's and the analyst's in one list each; F1 shows them. Whom a key is for."""
+"""The keys of the experimenter's and the analyst's windows, one list each, shown by F1; routing of keys."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ _WIDTH = 720  # of the page, before the font's scale
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """A key, the act it stands for, and what it does in words."""
+    """A key, its action, and a description."""
 
     key: str
     act: str
@@ -79,12 +79,12 @@ ANALYST_KEYS = (
     Key("F1", "keys", tr_noop("show or hide these keys")),
 )
 
-_SAME = {"Return": "Space", "Enter": "Space", "=": "+"}  # keys that do what another does
-_PLAIN = Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier  # change nothing of a key's meaning
+_SAME = {"Return": "Space", "Enter": "Space", "=": "+"}  # keys with the action of another
+_PLAIN = Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier  # do not change a key's meaning
 
 
 def act_of(event: QKeyEvent) -> str | None:
-    """Return the act a key stands for; None where it stands for none."""
+    """Return the action of a key, None if it has none."""
     name, modifiers = QKeySequence(event.key()).toString(), event.modifiers() & ~_PLAIN
     name = _SAME.get(name, name)
     if modifiers == Qt.KeyboardModifier.ControlModifier:
@@ -95,14 +95,14 @@ def act_of(event: QKeyEvent) -> str | None:
 
 
 def name_of(event: QKeyEvent) -> str:
-    """Return the name of a key that is pressed without Ctrl, Alt or the like; empty where it is held with one."""
+    """Return the name of a key pressed without Ctrl, Alt or the like; empty with one of them."""
     if event.modifiers() & ~_PLAIN:
         return ""
     return "Enter" if event.key() == Qt.Key.Key_Return else QKeySequence(event.key()).toString()
 
 
 class KeysPage(Panel):
-    """Every key, over the window."""
+    """The list of all keys, shown over the window."""
 
     def __init__(self, parent: QWidget, keys: tuple[Key, ...] = KEYS) -> None:
         super().__init__(tr("keys of this window"))
@@ -122,16 +122,16 @@ class KeysPage(Panel):
         self._column = vbox(header, (self._area, 1), on=self, margins=margins, spacing=GRID)
 
     def toggle(self) -> None:
-        """Show the page over everything else, or hide it; it is filled when it is first seen."""
-        if self.layout() is None:  # Qt returns None where there is none
+        """Show the page over everything else, or hide it; it is filled when first shown."""
+        if self.layout() is None:  # None before it is filled
             self._fill()
         self.setVisible(not self.isVisible())
         self.raise_()
-        self.fit()  # once it has the window's type
+        self.fit()  # after it has the window's font
 
     def fit(self) -> None:
-        """Take the middle of the window, as much as there is need for."""
-        if self.layout() is None:  # it was never seen
+        """Centre the page in the window, no larger than necessary."""
+        if self.layout() is None:  # never shown
             return
         window = self._window.size()
         size = QSize(px(_WIDTH), 0).boundedTo(window - QSize(4 * GRID, 4 * GRID))
@@ -145,10 +145,10 @@ class KeysPage(Panel):
 class Keyboard(QObject):
     """The keys of the experimenter's and the subject's window."""
 
-    free = Signal()  # it is no longer a text's, or another program's
+    free = Signal()  # no text field or other program has the keyboard any more
 
     def __init__(self, window: QMainWindow, plan: QWidget, subject: SubjectWindow, act: Callable[[str], None]) -> None:
-        """Watch the subject's window and the experimenter's plan; `act` does what a key of the course stands for."""
+        """Watch the subject's window and the experimenter's plan; `act` carries out the action of a key."""
         super().__init__(window)
         self._window, self._plan, self._subject, self._act = window, plan, subject, act
         self._since_answer = QElapsedTimer()
@@ -161,17 +161,17 @@ class Keyboard(QObject):
         application.applicationStateChanged.connect(self._state_changed)
 
     def focused_field(self) -> QWidget | None:
-        """Return the text field that the experimenter types in; None where there is none."""
+        """Return the text field that the experimenter types in, or None."""
         field: QWidget | None = QApplication.focusWidget()
         if field is None or field.window() is self._subject:
             field = self._window.focusWidget()
         return field if is_text_field(field) and field.isVisible() else None
 
     def press(self, event: QKeyEvent) -> bool:
-        """Take a key that no field took; return whether it meant anything."""
+        """Handle a key that no field took; return whether it has a meaning."""
         match owner(name_of(event), self._subject.asks, typing=self.focused_field() is not None):
             case "answer":
-                if self._subject.isVisible():  # nobody answers on a page that nobody sees
+                if self._subject.isVisible():  # no answers on an invisible page
                     self._subject.take_key(event)
                 return True
             case "course":
@@ -184,7 +184,7 @@ class Keyboard(QObject):
                 return False
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Give the keys of the plan and of the subject's window to whom they are meant for."""
+        """Route the keys of the plan and of the subject's window to their owners."""
         if event.type() != QEvent.Type.KeyPress or not isinstance(event, QKeyEvent) or self._subject.measuring:
             return False
         field, key = self.focused_field(), name_of(event)
@@ -198,7 +198,7 @@ class Keyboard(QObject):
         return watched is self._subject and key_owner == "course" and self.press(event)
 
     def _pressed_twice(self, event: QKeyEvent) -> bool:
-        """Say whether a key is the second press of the one that gave the answer, as the system counts presses."""
+        """Say whether a key is a double press of the one that gave the answer, by the system's interval."""
         soon = self._since_answer.isValid() and self._since_answer.elapsed() < QApplication.doubleClickInterval()
         return soon and event.key() == self._subject.answer_key
 
