@@ -95,6 +95,11 @@ def quantity(value: float | None, digits: int, unit: str = "") -> str:
     return f"{round(value, digits) + 0.0:.{digits}f} {unit}".rstrip().replace("-", "−")
 
 
+def no_strokes(device: object) -> str:
+    """Say why a session has no strokes; `device` is None for one without forces."""
+    return "no forces were recorded" if device is None else "no stroke was found"
+
+
 def number(value: float | None, digits: int = 3, *, factor: float = 1.0) -> str:
     """Return a number times a factor with `digits` significant digits, or a dash for None.
 

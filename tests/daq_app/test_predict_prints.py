@@ -4,6 +4,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from report_session import record
 
 from daq_app.cli.main import run
 from daq_app.cli.verbs import predict
@@ -59,3 +60,10 @@ def test_a_trial_without_an_sed_is_a_flaw_and_a_session_without_one_says_why(tri
     trials.clear()
     assert run(["predict", "P01"]) == 0
     assert "nothing to predict: no stroke was found" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("verb", "opening"), [("analyse", ""), ("predict", "nothing to predict: ")])
+def test_a_session_of_scores_alone_is_said_to_hold_no_forces(tmp_path, capsys, verb, opening):
+    session, _ = record(tmp_path / "P01", forces=False, per_block=1)
+    assert run([verb, str(session)]) == 0
+    assert f"{opening}no forces were recorded" in capsys.readouterr().out.splitlines()

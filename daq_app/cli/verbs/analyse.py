@@ -10,7 +10,7 @@ import math
 from daq_app.batch.derived import analyse_session, analysis_document, outdated_prediction
 from daq_app.cli.options import add_analysis, add_number, add_session, area_law
 from daq_app.console import DONE, FLAWED, Console, table
-from daq_app.wording import number
+from daq_app.wording import no_strokes, number
 from sessions.recording import Recording
 from sessions.strokes import Analysis
 from sessions.strokes.trial_analysis import Tilt
@@ -58,7 +58,9 @@ def _print(recording: Recording, analysis: Analysis, console: Console) -> None:
         ]
         for stroke in report.strokes
     ]
-    console.say(table(rows, header=["stroke", "onset [s]", "lift [s]", "steady [s]"]) if rows else "no stroke")
+    console.say(
+        table(rows, header=["stroke", "onset [s]", "lift [s]", "steady [s]"]) if rows else no_strokes(recording.info)
+    )
     console.say(*table_texts(report, "strokes"))
 
 

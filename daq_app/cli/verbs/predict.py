@@ -12,7 +12,7 @@ from pathlib import Path
 from daq_app.batch.derived import analyse_session, open_visit, predict_session, stored_options
 from daq_app.cli.options import add_analysis, add_flag, add_number, add_shared, add_visit, area_law, numbers_by_key
 from daq_app.console import DONE, FLAWED, Console, WrongValue, table
-from daq_app.wording import number
+from daq_app.wording import no_strokes, number
 from sessions.plan.protocols.protocol import DEEPEST_INDENTATION, INDENTATIONS
 from sessions.prediction import BY_NAME, SED, PredictionOptions, SessionPrediction, TrialPrediction, finger_in
 from sessions.prediction.afferent import AfferentSettings, firing_document, session_firing, settings_with
@@ -101,8 +101,7 @@ def _print(
     from sessions.report import Further, numbers_alone
 
     if not prediction.trials:
-        missing = "forces were recorded" if recording.info is None else "stroke was found"
-        console.say(f"nothing to predict: no {missing}")
+        console.say(f"nothing to predict: {no_strokes(recording.info)}")
         return
     further = Further()
     if options.afferent:
