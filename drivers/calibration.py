@@ -81,7 +81,7 @@ LIMITS = (1.0,) * 6 + (1.05,)
 
 
 def loads(wrench: Array, rated: Array) -> Array:
-    """Return |Fx| to |Tz| over their ranges and the combined load (n, 7) [-] of a wrench (n, 6) [N, N mm].
+    """Return the sizes of a wrench (n, 6) [N, N mm] relative to its ranges, and the combined load (n, 7) [-].
 
     Lateral forces strain the same beams as the torque about z, and the force along z the same as lateral torques: the
     combined load is the greater of Fxy + Tz and Fz + Txy, magnitudes over their ranges (maker's manual of the Ethernet
