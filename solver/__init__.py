@@ -10,8 +10,8 @@ Lengths are in mm, times in s, forces in N per mm of width, stresses and energy 
 >>> [isinstance(answer, NoSteadyState) for answer in solve_many(scenes)]
 [False, True]
 
-What is not named here is private and may change; `docs/how-to/solve-another-body.md` names what bodies of your own need.
-What needs the compiled loops is loaded late.
+What is not named here is private and may change; `docs/how-to/solve-another-body.md` names what other bodies need. What
+needs the compiled loops is loaded late.
 """
 
 from importlib import import_module
