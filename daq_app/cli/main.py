@@ -124,7 +124,7 @@ def _overview() -> argparse.ArgumentParser:
         epilog=f"verbs:\n{verbs}\n\n'daq-app VERB --help' explains one and shows an example. "
         "'daq-app' alone opens the window, 'daq-app window SESSION' a session in it. "
         "'daq-app --version' prints the program's version.\n\n"
-        "exit codes: 0 done, 1 could not be done, 2 wrong command line or value in a file, "
+        "exit codes: 0 done, 1 could not be done, 2 wrong command line or value in a TOML file, "
         "3 done with named losses or flaws, 130 stopped",
     )
 

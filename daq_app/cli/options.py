@@ -116,7 +116,7 @@ _SHARED: Mapping[str, dict[str, Any]] = {
     "variants": {"choices": ["none", "small", "both"]},
     "height": {"type": number_in_range("--height", float, *HEIGHTS, _HEIGHTS), "metavar": "MM"},
     "simulate_subject": {"type": number_in_range("--simulate-subject", int, 0, LARGEST), "metavar": "SEED"},
-    "headless": {"action": "store_true", "help": "no window: answers at the terminal, or simulated"},
+    "headless": {"action": "store_true", "help": "changes nothing: this verb never opens a window"},
     "workers": {
         "type": number_in_range("--workers", int, 1, 1024), "metavar": "N",
         "help": "processes on this computer (as many as cores)",

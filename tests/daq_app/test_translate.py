@@ -64,12 +64,12 @@ def test_nonsense_is_refused_in_a_sentence(tmp_path, capsys):
         ["sensotact-friction", "--language", "Dutch"],
         ["sensotact-friction", "--language", "en"],
         ["nowhere", "--language", "de"],
-        ["sensotact-friction", "--language", "nl", "--out", str(existing)],
     ):
         assert run(["translate", *wrong]) == 2
         assert capsys.readouterr().err.startswith("daq-app: ")
+    assert run(["translate", "sensotact-friction", "--language", "nl", "--out", str(existing)]) == 1
+    assert "is there already" in capsys.readouterr().err
     assert existing.read_text() == "kept"
-    capsys.readouterr()
     assert run(["translate", "--program", "--language", "nl", "--out", str(tmp_path / "none" / "nl.xlf")]) == 1
     assert "check its name" in capsys.readouterr().err
 

@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 from daq_app.console import DONE, Console, WrongValue
 from daq_app.window.subject import SubjectText, usual_question
 from daq_app.wording import EXPERIMENTER, SUBJECT, translations
-from sessions.file_access import name_failure, write_whole
+from sessions.file_access import NotOurs, name_failure, write_whole
 from sessions.plan.protocols.protocol import ENGLISH, PRE_EVALUATION, Protocol, Translation, check_language, protocol
 from sessions.prediction import QUANTITIES
 from sessions.recording import RecordingError
@@ -49,7 +49,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.say(text.rstrip())
     else:
         if options.out.exists():
-            raise WrongValue(f"--out {options.out} is there already: give a new file, or move that away")
+            raise NotOurs(f"{options.out} is there already: give a new file, or move that away")
         with name_failure(RecordingError, f"{options.out} cannot be written", new=True):
             write_whole(options.out, text.encode())
     destination = {"out": None, "text": text} if options.out is None else {"out": str(options.out)}
