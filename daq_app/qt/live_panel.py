@@ -1,4 +1,4 @@
-"""What the transducer measures now: forces, ratio, speed, all six axes, and the finger on the sample."""
+"""Live signals of the transducer: forces, ratio, speed, all six axes, and the finger on the sample."""
 
 from collections.abc import Callable, Sequence
 
@@ -20,21 +20,21 @@ from daq_app.window.live_trace import CHANNELS, PlotScale
 from daq_app.wording import quantity, tr, tr_noop
 from drivers.arrays import Array
 
-_LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
-_COLOURS = {"N": N, "T": T, "mu": MU}  # under the captions of the numbers
-_SIZES = ((TITLE, "title"), (TEXT, "value"), (SMALL, "tight"))  # of the numbers: the first for which there is room
-LEAST_FOR_ACTS = 170  # a lower panel has room for the numbers alone, before the font's scale [px]
+_LENGTHS = (1, 2, 5, 10, 20, 60)  # selectable stretches [s]
+_COLOURS = {"N": N, "T": T, "mu": MU}  # below the captions of the numbers
+_SIZES = ((TITLE, "title"), (TEXT, "value"), (SMALL, "tight"))  # of the numbers: the first that fits is used
+LEAST_FOR_ACTS = 170  # a lower panel has room for the numbers only, before the font's scale [px]
 _NAMES = {  # as spoken
     "N": tr_noop("Normal force"), "T": tr_noop("Tangential force"),
     "mu": tr_noop("Friction coefficient"), "speed": tr_noop("Speed"),
 }  # fmt: skip
-_WIDEST = {"N": "−00.00 N", "T": "00.00 N", "mu": "0.00", "speed": "000 mm/s"}  # each number keeps its place
-LEAST_FOR_SPEED = 280  # a lower panel shows force and ratio alone
-LEAST_FOR_MODEL = 430  # a lower panel shows what is measured alone
+_WIDEST = {"N": "−00.00 N", "T": "00.00 N", "mu": "0.00", "speed": "000 mm/s"}  # of each number
+LEAST_FOR_SPEED = 280  # a lower panel shows force and ratio only
+LEAST_FOR_MODEL = 430  # a lower panel shows measured signals only
 TRAIL = 2.0  # of the centre of pressure [s] ...
 _POINTS = 120  # ... and its number of points
-TAB = 24  # width of what opens and closes the drawer, before the font's scale [px]
-READ_EVERY = 0.25  # numbers beside the plots change no more often than they can be read [s]
+TAB = 24  # width of the drawer's tab, before the font's scale [px]
+READ_EVERY = 0.25  # least time between changes of the numbers, to keep them readable [s]
 
 PLOTS = (
     (tr_noop("N and T [N]"), (Curve("N", N), Curve("T", T)), PlotScale(0.0, 5.0, 5.0)),
@@ -48,17 +48,17 @@ AXIS_PLOTS = (
 )
 INSTEAD = Curve("SED instead", MODEL, dashed=True, named=False)
 _SED = (tr_noop("SED [kPa], model"), (Curve("SED", MODEL), INSTEAD), PlotScale(0.0, 5.0, 5.0))
-FINITE = "live model/finite strain"  # under which the choice is remembered
+FINITE = "live model/finite strain"  # key under which the choice is remembered
 
 
 class LiveBar(QWidget):
-    """Numbers that are read, and what is shown."""
+    """The numbers above the plots, and the display options."""
 
     def __init__(self, length: Callable[[int], None], hold: Callable[[], None], finite: Callable[[bool], None]) -> None:
-        """Show no numbers; `length` takes what is chosen [s], `hold` is called at a press, `finite` takes a choice."""
+        """Show no numbers; `length` takes the stretch [s], `hold` is called on a press, `finite` takes a choice."""
         super().__init__()
         self.forces_shown = True
-        self._short = False  # the buttons show their keys alone
+        self._short = False  # the buttons show only their keys
         self._acts = 0  # width of the buttons with their words and of the drop-down [px]
         self.values: dict[str, QLabel] = {}
         self._captions: dict[str, QLabel] = {}
@@ -74,7 +74,7 @@ class LiveBar(QWidget):
         self._rows = hbox(self._numbers(), acts, on=self, spacing=GRID // 2)
         for widget in (self.hold, self.finite, self.length):
             widget.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        # Numbers give way where there is no room for all of them, and buttons where there is none for a second row.
+        # Numbers shrink if they do not all fit, and buttons if there is no room for a second row.
         self.setMinimumSize(1, QFontMetrics(font(TITLE)).height())
 
     def show_forces(self, visible: bool) -> None:
@@ -82,7 +82,7 @@ class LiveBar(QWidget):
         self._fit()
 
     def show_numbers(self, values: Array) -> None:
-        """Show the means of the last readings (channels, n)."""
+        """Show the means of the latest readings (channels, n)."""
         for channel, form in PICTURE.items():
             finite = values[CHANNELS.index(channel)]
             finite = finite[np.isfinite(finite)]
@@ -95,7 +95,7 @@ class LiveBar(QWidget):
         self._fit()
 
     def _fit(self) -> None:
-        """Put the acts below the numbers where both find no room in a row, and the numbers in smaller type then."""
+        """Put the buttons below the numbers if both do not fit into a row, and then use smaller numbers."""
         if not self._short:
             self._acts = sum(push.sizeHint().width() + GRID for push in (self.finite, self.hold)) + self.length.width()
         self._short = self._acts > self.width()
@@ -112,7 +112,7 @@ class LiveBar(QWidget):
                 widget.setVisible(self.forces_shown and room >= 0)
 
     def height_with_acts(self, width: int) -> int:
-        """Return the height that numbers and acts take at a width [px]."""
+        """Return the height of numbers and buttons at a width [px]."""
         numbers, acts = self.minimumHeight(), self.hold.sizeHint().height()
         return max(numbers, acts) if self._in_a_row(width) else numbers + self._rows.spacing() + acts
 
@@ -141,13 +141,13 @@ class LiveBar(QWidget):
             if channel in _COLOURS:
                 caption.setStyleSheet(f"border-bottom: 3px solid {_COLOURS[channel]};")
             self.values[channel], self._captions[channel] = value, caption
-        # Where there is room, a caption stands nearer to its own number than to another.
+        # If there is room, a caption is nearer to its own number than to another.
         spread = [widget for channel, value in self.values.items() for widget in (1, self._captions[channel], value)]
         return hbox(*spread[1:], len(PICTURE), spacing=GRID)
 
 
 def speech(channel: str, text: str) -> str:
-    """Return what a screen reader says of a number.
+    """Return a screen reader's text for a number.
 
     >>> speech("N", "1.20 N"), speech("mu", "–")
     ('Normal force 1.20 N', 'Friction coefficient no number')
@@ -156,7 +156,7 @@ def speech(channel: str, text: str) -> str:
 
 
 def short_name(channel: str) -> str:
-    """Return how a channel is written where there is little room."""
+    """Return the short name of a channel."""
     return {"mu": "µ", "speed": tr("speed")}.get(channel, channel)
 
 
@@ -167,13 +167,13 @@ class LivePanel(Panel):
         super().__init__(tr("live readings"))
         self._feed, self._model, self._model_trace = feed, model, ModelTrace()
         self._seconds = 10
-        self._hold_time: float | None = None  # device time the picture is held at; readings go on behind it
+        self._hold_time: float | None = None  # device time of the held picture, while readings continue
         self._read_at = 0.0
-        self._content: object = None  # what the picture was drawn of
+        self._content: object = None  # data of the drawn picture
         self.plots = [LivePlot(*plot) for plot in (*PLOTS, *AXIS_PLOTS)]
         self._model_plot = LivePlot(*_SED, MODEL_CHANNELS)
-        self._model_plot.setMinimumHeight(1)  # folded where there is little room, it must not keep the window large
-        self._column = (*self.plots[:3], self._model_plot)  # below each other
+        self._model_plot.setMinimumHeight(1)  # it must not keep the window large
+        self._column = (*self.plots[:3], self._model_plot)  # one below the other
         self.finger = FingerView()
         self.map = ContactMap()
         self.bar = LiveBar(self.show_seconds, self._hold, self._finite)
@@ -189,7 +189,7 @@ class LivePanel(Panel):
         self.show_finite(settings().value(FINITE) == "yes")
 
     def set_room(self, room: bool) -> None:
-        """Say whether there is room for the stroke and an open drawer beside each other."""
+        """Set whether the stroke and an open drawer fit next to each other."""
         self.drawer.open.set_room(room)
         self._show_tab()
 
@@ -207,7 +207,7 @@ class LivePanel(Panel):
         self._show_acts()
 
     def show_forces(self, visible: bool) -> None:
-        """Show readings, or nothing of them where the protocol keeps them from the experimenter."""
+        """Show readings, or hide them if the protocol hides them from the experimenter."""
         if visible != self.bar.forces_shown:
             self._pictures.setVisible(visible)
             self.bar.show_forces(visible)
@@ -230,7 +230,7 @@ class LivePanel(Panel):
         self._model.follow_at("finite" if finite else "small")
 
     def draw(self, marks: tuple[Mark, ...], clock: float, *, silent: bool = False) -> None:
-        """Draw a frame; `clock` [s] is the machine's. Where the transducer is `silent`, nothing is measured now."""
+        """Draw a frame; `clock` [s] is the machine's. A `silent` transducer measures nothing now."""
         if not self.bar.forces_shown:
             return
         trace = self._feed.trace
@@ -248,7 +248,7 @@ class LivePanel(Panel):
         content = (trace, now, end_time, self._seconds, self._columns(), visible_marks, frozen, hold, latest)
         if content != self._content:
             self._content = content
-            if end_time == newest or trace.holds(end_time - self._seconds):  # else the stroke stays as it was drawn
+            if end_time == newest or trace.holds(end_time - self._seconds):  # else the drawn stroke stays
                 self._show_until(self.plots[:3], end_time, visible_marks, clock)
             self._show_until(self.plots[3:], now, visible_marks, clock)
             for plot in self._column:
@@ -277,12 +277,12 @@ class LivePanel(Panel):
             self._model_trace.add_prediction(prediction)
 
     def _columns(self) -> int:
-        """Return how many columns a curve has: two pixels each, as its line is wide."""
+        """Return the number of columns of a curve: two pixels each, the width of its line."""
         first = next((plot for plot in self.plots if plot.isVisible()), self.plots[0])
         return max(first.width() // 2, 100)
 
     def _draw_model(self, now: float, clock: float, *, still: bool, silent: bool) -> None:
-        """Draw what the model says: of the last stroke once it was solved in full, or else of this moment."""
+        """Draw the model: the last stroke once it has its full solve, else the present state."""
         if self._model_plot.isVisible() and (not still or self._model_trace.holds(now - self._seconds)):
             columns = self._model_trace.columns(now - self._seconds, np.nextafter(now, np.inf), self._columns())
             self._model_plot.show_columns(columns, now, (), clock)
@@ -296,7 +296,7 @@ class LivePanel(Panel):
         self.finger.show_model(picture, row, text, clock)
 
     def _show_acts(self) -> None:
-        """Show the acts where there are pictures that keep their least height beneath them; their keys always serve."""
+        """Show the buttons if the pictures below keep their least height; their keys always work."""
         inside = self.contentsRect().marginsRemoved(self._rows.contentsMargins())
         least = self.bar.height_with_acts(inside.width()) + self._rows.spacing() + self.drawer.least_height()
         visible = self.bar.forces_shown and self.height() >= px(LEAST_FOR_ACTS) and inside.height() >= least
@@ -321,7 +321,7 @@ class LivePanel(Panel):
 
     def _hold(self) -> None:
         self._hold_time = self._feed.trace.newest if self.bar.hold.isChecked() else None
-        self.bar.hold.setChecked(self._hold_time is not None)  # of nothing no picture is held
+        self.bar.hold.setChecked(self._hold_time is not None)  # without readings, no picture is held
         self.bar.show_words()
 
     def _finite(self, finite: bool) -> None:

@@ -1,4 +1,4 @@
-"""Where the finger presses on the sample, and the deforming finger with its SED, while a stroke goes on."""
+"""Live pictures during a stroke: the contact on the sample, and the deforming finger with its SED."""
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
@@ -15,25 +15,25 @@ from daq_app.wording import tr
 from drivers.arrays import Array
 from solver.prediction import ROW
 
-_ALONG, ACROSS = 60.0, 40.0  # what is drawn of the face [mm]
+_ALONG, ACROSS = 60.0, 40.0  # size of the drawn part of the face [mm]
 _MARGIN = 4  # [pixels]
-TOO_SMALL = 0.2  # a picture with fewer pixels to the millimetre is left out
+TOO_SMALL = 0.2  # pixels per millimetre below which a picture is left out
 
-_VIEW_BOX = (-9.0, 9.0, -1.0, 13.0)  # left, right, below, above of what is drawn [mm]
-_FINGER_SHARE = 0.62  # of the height that the finger takes; the row has the rest
+_VIEW_BOX = (-9.0, 9.0, -1.0, 13.0)  # left, right, below, above of the drawn region [mm]
+_FINGER_SHARE = 0.62  # share of the height for the finger; the row has the rest
 # The colour map magma (van der Walt and Smith, 2015), from its light end to a fifth before its dark one.
 MAGMA = (
     "#fcfdbf", "#fde9aa", "#fed698", "#fec186", "#feae77", "#fd9a6a", "#fb8660", "#f7715c", "#f05f5d", "#e44f64",
     "#d5446c", "#c43c74", "#b3367a", "#a1307e", "#902a81", "#7f2482", "#6e1e81", "#5d177f", "#4d117a", "#3b0f70",
 )  # fmt: skip
-ROW_LINES = 4.0  # of text, below which height the row is left out and the finger has all the room
+ROW_LINES = 4.0  # height in lines of text below which the row is left out
 TOP_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop
-EVERY = 1 / 30  # no new picture sooner after another: nobody sees more [s]
-_TOP = 0.97  # of the faces' SED lies below the end of the colour scale
+EVERY = 1 / 30  # least time between two pictures: nobody sees more [s]
+_TOP = 0.97  # share of the faces' SED below the end of the colour scale
 
 
 class ContactMap(PaintedWidget):
-    """Where the finger presses now, and where it came from. The drawing is of the face's middle, not to its edges."""
+    """The present contact and its trail, drawn in the middle of the face, without its edges."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -45,13 +45,13 @@ class ContactMap(PaintedWidget):
         self.setAccessibleName(tr("centre of pressure on the sample: nothing touches"))
 
     def show_direction(self, direction: int) -> None:
-        """Show which way the stroke is to go: +1 away from the subject, -1 towards, 0 none."""
+        """Show the direction of the next stroke: +1 away from the subject, -1 towards, 0 none."""
         if direction != self._direction:
             self._direction = direction
             self.redraw()
 
     def show_trail(self, position: Array) -> None:
-        """Show the last positions (n, 2) [mm], the newest last; nan where nothing presses."""
+        """Show the last positions (n, 2) [mm], the newest last; nan without contact."""
         trail = position[np.isfinite(position[:, 0])]
         touching = bool(len(position)) and bool(np.isfinite(position[-1, 0]))
         if not len(trail) and not len(self._trail):
@@ -83,12 +83,12 @@ class ContactMap(PaintedWidget):
         return min((self.height() - 2 * _MARGIN) / _ALONG, (self.width() - self._labels_width() - 2 * _MARGIN) / ACROSS)
 
     def _labels_width(self) -> float:
-        """Return the width of the column of words at the right of the sample."""
+        """Return the width of the column of labels to the right of the sample."""
         metrics = QFontMetricsF(font(SMALL))
         return max(metrics.horizontalAdvance(text) for text in self._labels) + 2 * _MARGIN
 
     def _middle(self) -> QPointF:
-        """Return where the middle of the face is: that of the widget, or as far left as the words need."""
+        """Return the centre of the face: the centre of the widget, or further left to leave room for the labels."""
         room = self.width() - self._labels_width() - _MARGIN
         return QPointF(min(self.width() / 2, room - ACROSS * self._per_mm() / 2), self.height() / 2)
 
@@ -130,7 +130,7 @@ class ContactMap(PaintedWidget):
 
 
 class FingerView(QWidget):
-    """A picture of the last state of a model."""
+    """A picture of the latest state of the model."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -141,7 +141,7 @@ class FingerView(QWidget):
         self._heights = PlotScale(0.0, 5.0, 5.0)  # [kPa]
         self._drawn_at = -1.0  # [s]
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # nothing behind it needs painting
-        self.setMinimumSize(100, 1)  # it is folded where it is low
+        self.setMinimumSize(100, 1)  # a low one is folded away
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName(tr("finger as the model sees it"))
 
@@ -169,7 +169,7 @@ class FingerView(QWidget):
         box = QRectF(4, 0, self.width() - 8, self.height())
         height = painter.boundingRect(box, flags, words := breakable(self._text.text)).height()
         painter.drawText(box, flags, words)
-        # Three lines are always left to them, so that the picture stays where it is; a failure takes what it needs.
+        # Three lines are always reserved for text, so that the picture does not move; a failure takes what it needs.
         line = painter.fontMetrics().height()
         top = max(height, 3.0 * line) + 4
         painter.setFont(font(SMALL))
@@ -229,7 +229,7 @@ class FingerView(QWidget):
 
 
 def _alike(picture: Picture | None, previous: Picture | None) -> bool:
-    """Say whether two pictures show the same: a finger that nothing touches is reported sixty times a second."""
+    """Say whether two pictures are equal: a finger without contact is reported sixty times a second."""
     if picture is previous or picture is None or previous is None:
         return picture is previous
     return np.array_equal(picture.outline, previous.outline)

@@ -1,7 +1,7 @@
-"""One live plot: curves over the last seconds, with gaps left as gaps and what was found in them marked.
+"""One live plot: curves over the last seconds, with gaps and with marks of detected events.
 
-Painted by hand: what stands still is painted once and copied, curves are lines a pixel wide. So a frame costs
-a fraction of what a scene of items does (docs/decisions/2026-11-21-the-live-plots-are-painted.md).
+Static parts are painted once and copied, curves are lines a pixel wide. So a frame costs a fraction of
+a scene of items (docs/decisions/2026-11-21-the-live-plots-are-painted.md).
 """
 
 from collections.abc import Iterable, Sequence
@@ -18,13 +18,13 @@ from daq_app.window.course_state import Mark
 from daq_app.window.live_trace import CHANNELS, SCALE_MARGIN, Columns, PlotScale, ticks, times
 from daq_app.wording import tr, tr_noop
 
-AXIS_WIDTH = 52  # the same for all, so that their times stand under each other [before the font's scale]
-_LEAST = 36  # height that holds the name and the times under it, likewise
-SAMPLE = 14  # length of the piece of line before a curve's name, likewise
-DASHES = 45  # times two thirds of a dash in the stretch that is shown
-_TOP = 2  # above the names [px]
-LINES = 3  # of type: a lower plot has no line to spare for its names
-FAR = 1e4  # distance beyond which all values look alike [px]
+AXIS_WIDTH = 52  # the same for all plots, so that their time axes align, before the font's scale [px]
+_LEAST = 36  # height of the name and the times below it, before the font's scale [px]
+SAMPLE = 14  # length of the line sample before a curve's name, before the font's scale [px]
+DASHES = 45  # thirds of a dash period in the displayed stretch
+_TOP = 2  # room above the names [px]
+LINES = 3  # height in lines of type below which a plot has no line for its names
+FAR = 1e4  # distance to which values outside of the plot are clipped [px]
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Curve:
     channel: str
     colour: str  # a token's name, or a colour
     dashed: bool = False
-    named: bool = True  # in the plot, where it has several
+    named: bool = True  # show its name if the plot has several curves
 
 
 class LivePlot(PaintedWidget):
@@ -43,7 +43,7 @@ class LivePlot(PaintedWidget):
     def __init__(
         self, name: str, curves: Sequence[Curve], scale: PlotScale, channels: Iterable[str] = CHANNELS
     ) -> None:
-        """Show nothing yet; `channels` names the rows of what will be shown."""
+        """Show nothing yet; `channels` names the rows of the data."""
         super().__init__()
         self._name = tr(name)
         self._rows = tuple(tuple(channels).index(curve.channel) for curve in curves)
@@ -51,7 +51,7 @@ class LivePlot(PaintedWidget):
         self._scale = scale
         self._seconds: float = 10.0
         self._times_shown: bool = True
-        self._end_label: str = tr("now")  # what the right edge is
+        self._end_label: str = tr("now")  # label of the right edge
         self._now = 0.0
         self._columns = Columns(np.empty(0), np.empty((len(tuple(channels)), 0)))
         self._marks: tuple[Mark, ...] = ()
@@ -60,7 +60,7 @@ class LivePlot(PaintedWidget):
         self.setAccessibleName(tr("plot of {name}", name=self._name))
 
     def show_axis(self, seconds: float | None = None, *, times: bool | None = None, end: str | None = None) -> None:
-        """Show the last so many seconds, with their numbers or without, and say which instant is at the right edge."""
+        """Set the displayed stretch [s], whether its times are shown, and the label of the right edge."""
         previous = self._seconds, self._times_shown, self._end_label
         self._seconds = self._seconds if seconds is None else seconds
         self._times_shown = self._times_shown if times is None else times
@@ -96,7 +96,7 @@ class LivePlot(PaintedWidget):
         painter.drawPixmap(0, 0, self._names)
 
     def _inside(self) -> QRectF:
-        """Return where curves are: below the names, but in a plot so low that its names must lie over them."""
+        """Return the rectangle of the curves: below the names, or in a low plot under them."""
         left = px(AXIS_WIDTH)
         below = px(SMALL + 5) if self._times_shown else 3
         names, high = QFontMetricsF(font(SMALL, bold=True)).height(), self.height() - below - _TOP
@@ -128,7 +128,7 @@ class LivePlot(PaintedWidget):
         per_unit = inside.height() / (high - low)
         above, below = (self._scale.high - high) * per_unit, (self._scale.low - low) * per_unit
         shift = max(line / 2.0 - inside.top() + above, inside.bottom() - below + line / 2.0 - self.height(), 0.0)
-        room = (inside.height() + above - below - 2.0 * shift) / line  # the numbers at the edges are moved inside
+        room = (inside.height() + above - below - 2.0 * shift) / line  # the labels at the edges are moved inside
         for value in ticks(self._scale.low, self._scale.high, room):
             y = inside.bottom() - (value - low) * per_unit
             painter.setPen(fine(sheer(self.theme.line, 110)))
@@ -140,7 +140,7 @@ class LivePlot(PaintedWidget):
     def _paint_times(self, painter: QPainter, inside: QRectF) -> None:
         metrics = QFontMetricsF(painter.font())
         widest = metrics.horizontalAdvance("−00 s ")
-        greatest_x = inside.right() - metrics.horizontalAdvance(f" {self._end_label}")  # where that label may begin
+        greatest_x = inside.right() - metrics.horizontalAdvance(f" {self._end_label}")  # where the end's label begins
         for value in times(self._seconds, inside.width() / widest):
             x = inside.right() + value * inside.width() / self._seconds
             painter.setPen(fine(self.theme.line))
@@ -156,9 +156,9 @@ class LivePlot(PaintedWidget):
             painter.drawText(QPointF(left, inside.bottom() + metrics.ascent() + 1), text)
 
     def _draw_names(self, inside: QRectF) -> QPixmap:
-        """Return the plot's name, and where it has several curves a piece of the line of each.
+        """Return the plot's name, and line samples with names if it has several curves.
 
-        They are painted last: in a low plot they lie over the curves, and would be unreadable beneath them.
+        They are painted last: in a low plot they lie over the curves, and would be illegible under them.
         """
         metrics = QFontMetricsF(font(SMALL, bold=True))
         picture = blank(self, "transparent")
@@ -190,11 +190,11 @@ class LivePlot(PaintedWidget):
         return picture
 
     def _paint_marks(self, painter: QPainter, inside: QRectF) -> None:
-        """Mark what was found: a line for onset and lift, a shaded stretch for the steady window."""
+        """Mark detected events: a line for onset and lift, a shaded stretch for the steady window."""
         across = inside.width() / self._seconds
         painter.setFont(font(SMALL))
         line = painter.fontMetrics().height()
-        free = inside.left()  # from where on no words stand yet
+        free = inside.left()  # end of the text so far
         for mark in self._marks:
             start, stop = (inside.right() + (time - self._now) * across for time in (mark.start, mark.stop))
             if mark.kind == "steady":
@@ -208,7 +208,7 @@ class LivePlot(PaintedWidget):
             painter.setPen(fine(self.theme.quiet, Qt.PenStyle.SolidLine if onset else Qt.PenStyle.DashLine))
             painter.drawLine(QPointF(start, inside.top()), QPointF(start, inside.bottom()))
             text = self._mark_texts[mark.kind]
-            if inside.bottom() - _TOP >= 5 * line:  # a lower plot has no room for words; the ones above it say them
+            if inside.bottom() - _TOP >= 5 * line:  # a lower plot has no room for text; plots above it have it
                 width = text.size().width()
                 left = start - width - 3 if onset else start + 3
                 if free <= left <= inside.right() - width:

@@ -1,4 +1,4 @@
-"""The experimenter's window: places the panels, and sends what buttons and keys mean."""
+"""The experimenter's window: places the panels, and sends the messages of buttons and keys."""
 
 import secrets
 from collections.abc import Callable
@@ -34,16 +34,16 @@ from daq_app.wording import tr
 _COURSE = frozenset({"primary", *ACTS})  # of the session in hand
 # Before the scale of the fonts [px]:
 _WIDE = 1366  # below it the bench folds to a strip of lamps
-_STACKED = 800  # below it what to do now has its two buttons below each other, and the strip of lamps is gone
+_STACKED = 800  # below it the two buttons of the current step are stacked, and the strip of lamps is hidden
 _ROOMY = 1100  # below it the six axes and the sample fold away
 TALL = 620  # below it the type of the headline is smaller
-LOW = 540  # up to it an empty notice gives up its line
+LOW = 540  # up to it an empty notice is hidden
 CARDS, _PLAN = 600, 316  # widths of the checklist and of the plan
-LEAST_CARDS = 260  # width in which no field of the checklist is cut
+LEAST_CARDS = 260  # least width without a truncated field of the checklist
 
 
 class MainWindow(QMainWindow):
-    """What the experimenter sees. It knows nothing but the last `View`."""
+    """The experimenter's window. It shows the latest `View`."""
 
     theme_chosen = Signal()
 
@@ -54,7 +54,7 @@ class MainWindow(QMainWindow):
         self.setAccessibleName(tr("experimenter's window"))
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.bridge = bridge
-        self._bench_shown: bool | None = None  # as somebody wished; None: as there is room
+        self._bench_shown: bool | None = None  # by choice; None: depends on the width
         self.header = Header()
         self.notice = Notice(bridge.send)
         self.to_do = ToDo(self._primary, lambda: self.act("go to review"))
@@ -111,7 +111,7 @@ class MainWindow(QMainWindow):
         self.side.show_view(view)
 
     def act(self, act: str) -> None:
-        """Do what a key, a button or an entry of the menu stands for."""
+        """Carry out the action of a key, a button or a menu entry."""
         if act in _COURSE and self.rooms.room == "review":
             self.go_to("run" if self.bridge.view.course is not None else "prepare")
         elif act.startswith("open "):
@@ -142,7 +142,7 @@ class MainWindow(QMainWindow):
             "pilot": self._pilot,
             "preview": self._preview,
             "tablet": lambda: self.tablet and self.tablet.server.renew(),
-            "subject": lambda: (self.side.show(), self.notice.warn("")),  # what said that it is closed goes
+            "subject": lambda: (self.side.show(), self.notice.warn("")),  # removes the message that it is closed
             "ruler": lambda: (self.side.show(), self.subject.check_ruler()),
             "open": self.rooms.choose,
             "report": lambda: (analyst := self.rooms.analyst) and analyst.write_report(),
@@ -177,7 +177,7 @@ class MainWindow(QMainWindow):
         self._fit()
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Leave; a session that is being recorded only when asked twice, and then it can be resumed."""
+        """Close; a session being recorded needs a second request, and can then be resumed."""
         warning = tr("A session is being recorded: end it with Ctrl+E, or close once more to leave it for later.")
         if self.bridge.recording and self.notice.warning != warning:
             self.notice.warn(warning)
@@ -247,16 +247,16 @@ class MainWindow(QMainWindow):
         self.to_do.show_what(headline(cards, self.page.subject.text()), primary, 0)
 
     def _turn(self, page: int) -> None:
-        """Show the page of a new session (0) or the course (1); keys go where they are of use there."""
+        """Show the page of a new session (0) or the running session (1), with the matching focus."""
         if page != self._left.currentIndex():
             self._left.setCurrentIndex(page)
             self._fit()
             (self.page.subject if page == 0 else self).setFocus()
-            self.subject.answer_key = None  # an answer of another session
+            self.subject.answer_key = None  # of another session
             if page == 1:
                 self.side.begin()
             else:
-                self.page.subject.clear()  # the next session is not begun by whoever was there last
+                self.page.subject.clear()  # the next session must not start with the previous subject
                 self.page.look_for_unfinished_sessions()
 
     def _line_changed(self) -> None:
@@ -287,7 +287,7 @@ class MainWindow(QMainWindow):
             self.side.show_force()
             marks = () if session is None else session.marks
             self.live.draw(marks, self.bridge.state.now, silent=self.bridge.view.bench.silent)
-        except Exception as error:  # noqa: BLE001  an error while drawing never stops a recording
+        except Exception as error:  # noqa: BLE001  a drawing error never stops a recording
             self.bridge.report_drawing_failure(error)
 
     def _fold_bench(self) -> None:
@@ -316,13 +316,13 @@ class MainWindow(QMainWindow):
         window.setObjectName("window")
         panels = QWidget()
         for panel in (self.bench, self.strip):
-            panel.hide()  # until it is known how much room there is
+            panel.hide()  # until the available room is known
         body = fill(_Panels(panels), (self._left, 4), (self.middle, 3), self.bench, self.strip)
         body.setContentsMargins(0, 0, 0, 0)
         body.setSpacing(GRID)
         page = QWidget()
         below = scroll_area(panels)
-        below.setMinimumHeight(1)  # what to do now is whole, however low the window is
+        below.setMinimumHeight(1)  # the current step is complete even in a low window
         vbox(self.notice, self.to_do, (below, 1), on=page, spacing=GRID)
         self.rooms.addWidget(page)
         room = vbox(self.header, (self.rooms, 1), spacing=GRID)
@@ -331,8 +331,8 @@ class MainWindow(QMainWindow):
 
 
 class _Panels(QHBoxLayout):
-    """The panels beside each other: only where the window is lower than their least heights are they scrolled."""
+    """The panels in a row, scrolled only if the window is lower than their least heights."""
 
     def hasHeightForWidth(self) -> bool:
-        """Say no: a scroll area would give panels with words that wrap the height that they like best."""
+        """Return False: a scroll area would give panels with wrapped text their preferred height."""
         return False

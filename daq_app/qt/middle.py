@@ -1,4 +1,4 @@
-"""The middle of the experimenter's window: the trials, the signals or an inspected trial, and the last stroke."""
+"""The middle of the experimenter's window: trials, live signals or an inspected trial, and the last stroke."""
 
 import math
 from collections.abc import Callable
@@ -37,14 +37,14 @@ AFTER_ONSET = ("stroking", "scoring", "settling")  # phases of a trial whose str
 
 
 class TrialStrip(QScrollArea):
-    """One row of tiles, which moves sideways where it is longer than its room; the trial in hand stays in sight."""
+    """One row of tiles, which scrolls sideways if it is too long; the current trial stays in sight."""
 
     def __init__(self, inspect: Callable[[int], None]) -> None:
         """Show no trials; `inspect` is called with the number of the trial whose tile is pressed."""
         super().__init__()
         self._inspect = inspect
         self._view: tuple[Tile, ...] = ()
-        self.horizontalScrollBar().rangeChanged.connect(self._take_room)  # new tiles have their places then
+        self.horizontalScrollBar().rangeChanged.connect(self._take_room)  # new tiles are placed by then
         self.tiles: list[QPushButton] = []
         inside = QWidget()
         self._row = hbox(1, on=inside, spacing=GRID // 2)
@@ -58,7 +58,7 @@ class TrialStrip(QScrollArea):
             return
         while len(self.tiles) > len(tiles):
             surplus = self.tiles.pop()
-            surplus.hide()  # until it is deleted nobody can press it
+            surplus.hide()  # it must not be pressed before it is deleted
             surplus.deleteLater()
         while len(self.tiles) < len(tiles):
             self._add()
@@ -75,7 +75,7 @@ class TrialStrip(QScrollArea):
             tile_button.setChecked(tile.number == number)
 
     def _take_room(self, _least: int, greatest: int) -> None:
-        """Be as high as the tiles, and the scroll bar where there is one."""
+        """Set the height to that of the tiles and of the scroll bar, if there is one."""
         self.setFixedHeight(max(px(2 * SMALL + 2 * GRID), TARGET) + (12 + GRID // 2 if greatest else 0))
         self._keep_in_sight()
 
@@ -93,7 +93,7 @@ class TrialStrip(QScrollArea):
 
 
 class InspectedTrial(QWidget):
-    """Takes the place of the signals while a trial is inspected; readings go on behind it."""
+    """Replaces the live signals while a trial is inspected; readings continue."""
 
     def __init__(self, back: Callable[[], None]) -> None:
         super().__init__()
@@ -106,7 +106,7 @@ class InspectedTrial(QWidget):
         for plot in self._plots:
             plot.show_axis(times=plot is self._plots[-1], end=tr("end"))
         header = hbox((self.heading, 1), button(tr("Back  I"), tr("back to the signals of this moment"), back))
-        # Two means in a row find room at every size of type.
+        # Two means per row fit at every size of type.
         cells = label_grid(((short_name(name), cell) for name, cell in self.cells.items()), 2)
         plots = zip(self._plots, (3, 2, 2), strict=True)
         vbox(header, self.verdict, self.details, cells, *plots, 0, on=self, spacing=GRID // 2)
@@ -140,13 +140,13 @@ class InspectedTrial(QWidget):
 
 
 class Middle(QWidget):
-    """Shows the signals of this moment, until a trial is inspected; the next stroke brings the signals back."""
+    """Shows live signals, or an inspected trial until the next stroke begins."""
 
     def __init__(self, bridge: Bridge, act: Callable[[str], None]) -> None:
         super().__init__()
         self._bridge = bridge
-        self.inspected: int | None = None  # number of the trial that is; None where none is
-        self._phase = ""  # of the session that was shown last
+        self.inspected: int | None = None  # number of the inspected trial, or None
+        self._phase = ""  # of the session shown last
         self.strip = TrialStrip(self.inspect)
         self.live = LivePanel(bridge.feed, bridge.model)
         self.trial = InspectedTrial(self.leave)
@@ -180,19 +180,19 @@ class Middle(QWidget):
         self.strip.show_tiles(course.tiles)
         session = self._bridge.state.session
         phase = "" if session is None else session.phase
-        onset = phase in AFTER_ONSET and self._phase not in AFTER_ONSET  # a busy machine never shows some phases
+        onset = phase in AFTER_ONSET and self._phase not in AFTER_ONSET  # a busy machine may skip phases
         if onset or phase == "stroking":
             self.leave()
         self._phase = phase
         self._show_inspection()
 
     def inspect(self, number: int) -> None:
-        """Show a trial; the one that is shown already gives way to the signals."""
+        """Show a trial, or the live signals if it is already shown."""
         self.inspected = None if number == self.inspected else number
         self._show_inspection()
 
     def toggle_inspection(self) -> None:
-        """Inspect the trial whose stroke was looked at last, or else the one in hand; or go back."""
+        """Inspect the trial whose stroke was judged last, else the current one; or go back."""
         session = self._bridge.state.session
         number = self.inspected
         if number is None and session is not None:
@@ -205,7 +205,7 @@ class Middle(QWidget):
             self.inspect(self.inspected)
 
     def toggle_drawer(self) -> None:
-        """Open or close the drawer of the signals, which come back where a trial is inspected."""
+        """Open or close the drawer of the signals, or leave an inspected trial."""
         if self.inspected is not None:
             self.leave()
         else:

@@ -1,4 +1,4 @@
-"""What the model says of the chosen trial: its finger, its history, the pictures of the session, another session."""
+"""The model's answer to the chosen trial: finger and history; pictures of the session; another session."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -23,26 +23,26 @@ from daq_app.wording import tr
 from solver.quantities import SED
 
 FINGER, SESSION, _COMPARISON = range(3)  # tabs
-COMPARISON_NAME = "compared"  # of the picture of two sessions, to the work
-_MARGINS = GRID // 2, GRID, GRID // 2, GRID  # of a tab [px]: with more at the sides three columns need over 1440
-STEPS_A_SECOND = 10.0  # of a history that plays: it counts steps, for pressing takes long and sliding little time
+COMPARISON_NAME = "compared"  # name of the picture of two sessions in requests
+_MARGINS = GRID // 2, GRID, GRID // 2, GRID  # of a tab [px]: with wider sides three columns need over 1440
+STEPS_A_SECOND = 10.0  # when a history plays: steps, because pressing takes long and sliding little time
 
 
 class ModelColumn(QWidget):
     """Four tabs: the finger, pictures of the session, another session, and the scene."""
 
     def __init__(self, tokens: Tokens, ask: Callable[[m.Ask], None], show: Callable[[str], None]) -> None:
-        """Show nothing; `ask` orders work, `show` takes what became of a file."""
+        """Show nothing; `ask` sends requests, `show` takes messages about saved files."""
         super().__init__()
         self._ask, self._show_message = ask, show
         self._state = AnalystState(Path())
         self._film: m.FingerHistory | None = None
         self._name = ""  # of the finger's pictures, after their kind
-        self._picture_request = ("", -1)  # picture that was asked for, and version of the report
+        self._picture_request = ("", -1)  # requested picture, and version of the report
         self._history_request: tuple[m.Key, int] | None = None  # of a trial without an answer, and version
-        self._index: int | None = None  # of the film; None: the settled state
+        self._index: int | None = None  # of the film; None: the state in full slip
         self.finger = FingerCanvas(tokens)
-        self.compared_finger = FingerCanvas(tokens, self.finger.sight)  # of the session that is compared
+        self.compared_finger = FingerCanvas(tokens, self.finger.sight)  # of the compared session
         self.compared_finger.hide()
         self.fields, self.plot = FieldBar(), FieldPlot(tokens)
         self.probe, self.errors = WrappedLabel("quiet", keeps_room=True), WrappedLabel("quiet")
@@ -121,7 +121,7 @@ class ModelColumn(QWidget):
         self._show_picture()
 
     def _show_picture(self, *_: object) -> None:
-        """Show the picture of the tab; what is not drawn is asked for only when it is looked at."""
+        """Show the picture of the tab; a picture not drawn yet is requested only when it is visible."""
         state, tab, index = self._state, self.tabs.currentIndex(), self.picture_choice.currentIndex()
         if tab == _COMPARISON and state.comparison is not None:
             view, name, caption = self.comparison.picture, COMPARISON_NAME, tr("both sessions")
@@ -152,7 +152,7 @@ class ModelColumn(QWidget):
         field = self.fields.field
         present = tuple(frame for frame in (finger, second) if frame is not None)
         frames = tuple(film.film.frames) if film is not None and self._filming else present
-        own_range = automatic_range(field, frames)  # of a film that is written: the same for all of it
+        own_range = automatic_range(field, frames)  # one range for a whole film
         common = state.common_range(field)
         colour_range = own_range if self.fields.mode == OWN or (lost and own_range[1] > common[1]) else common
         look = Look(field, self.fields.range(colour_range), self.near.isChecked(), self.mesh.isChecked(), lost)
@@ -165,7 +165,7 @@ class ModelColumn(QWidget):
         self.plot.show_field((finger, second) if second_text else (finger,), field, self.finger.sight.line)
         view_name = "contact" if self.near.isChecked() else "finger"
         self.film.setEnabled(bool(self._name) and film is not None)
-        step = "" if film is None or index is None else f" {index}"  # of the history that is shown
+        step = "" if film is None or index is None else f" {index}"  # of the displayed history
         self.save.set_name(f"{view_name}{self._name}{step}" if self._name else "")
 
     def _draw_line(self) -> None:
@@ -193,7 +193,7 @@ class ModelColumn(QWidget):
             self.player.slider.setFocus()
 
     def _ask_where(self, row: Row | None, version: int) -> None:
-        """Ask how far a solve without an answer came, once, where the solver had all that it needs."""
+        """Request the path of a solve without an answer, once, if the solver had all its inputs."""
         prediction = None if row is None else row.prediction
         if row is None or prediction is None or prediction.sed is not None:
             return
@@ -211,13 +211,13 @@ class ModelColumn(QWidget):
         self._ask(m.Write(f"picture {name}", path))
 
     def _heading(self) -> str:
-        """Return what every picture of a field is marked with: whether simulated, the session, and its errors."""
+        """Return the heading of every picture of a field: whether simulated, the session, and its errors."""
         report = self._state.report
         marks = () if report is None else (report.head, report.session)
         return "\n".join((" · ".join(filter(None, marks)), tr(FIELD_ERRORS)))
 
     def _save_finger(self, name: str, path: str) -> None:
-        """Write the picture of the SED as the report draws it, and any other field as it is shown."""
+        """Save the picture of the SED as the report draws it, and any other field as shown."""
         if self.fields.field.name == SED.name:
             self._save(name, path)
             return

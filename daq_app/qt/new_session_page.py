@@ -1,4 +1,4 @@
-"""The page on which a session is begun: a checklist of cards, each of which says in one line why not."""
+"""The page of a new session: a checklist of cards, each with one line on what is missing."""
 
 from collections.abc import Callable
 
@@ -29,13 +29,13 @@ from daq_app.wording import tr, tr_noop
 from sessions.plan.plan import NORMALS, Hand
 from sessions.plan.protocols.protocol import ENGLISH, protocol_names
 
-TWO = 565  # at which the cards stand in two columns, before the font's scale [px]
+TWO = 565  # width from which the cards are in two columns, before the font's scale [px]
 HANDS: tuple[Hand | None, ...] = (None, "right", "left")
 HAND_NAMES = tr_noop(("not stated", "right", "left"))
 
 
 class NewSessionPage(Panel):
-    """The left of the experimenter's window while no session is in hand."""
+    """The left of the experimenter's window between sessions."""
 
     changed = Signal()
 
@@ -43,13 +43,13 @@ class NewSessionPage(Panel):
         super().__init__(tr("new session"))
         self._send = send
         self._cards: tuple[Card, ...] = ()
-        self._source: object = None  # what the cards were derived from
+        self._source: object = None  # source data of the cards
         self.frames = {name: CardFrame(name) for name in CARD_FIELDS}
         self.subject = entry(tr("subject code, never a name"))
         meaning = tr("take the proposed code")
         self._proposal = button("", meaning, lambda: self.subject.setText(self._proposal.text()), "small")
         self.protocol = choice(tr("protocol"), (*protocol_names(), tr("choose a file …")))
-        self._protocol = SessionForm().protocol  # the last that is none of a file yet to be chosen
+        self._protocol = SessionForm().protocol  # the last selection other than "choose a file"
         self.protocol.setCurrentText(self._protocol)
         self.protocol.activated.connect(self._choose_protocol)
         self.study = entry(tr("study, a folder of its own; may be empty"))
@@ -92,7 +92,7 @@ class NewSessionPage(Panel):
         self._show_study()
 
     def _either(self, *texts: str) -> list[QRadioButton]:
-        """Return buttons of which one is pressed, the first to begin with; of all on the same card."""
+        """Return exclusive buttons, the first of them pressed."""
         buttons = [QRadioButton(option) for option in texts]
         for option in buttons:
             option.setAccessibleName(option.text())
@@ -135,7 +135,7 @@ class NewSessionPage(Panel):
         )
 
     def show_bench(self, bench: Bench) -> None:
-        # A simulated bench knows where its face lies.
+        # A simulated bench knows the height of its face.
         self._height.setVisible(self.with_forces.isChecked() and bench.frame is None)
         self._area.setVisible(self.with_forces.isChecked())
         text = tr("The subject strokes the transducer and scores.")
@@ -155,7 +155,7 @@ class NewSessionPage(Panel):
             self.people_score.setChecked(True)
 
     def check(self, bench: Bench, *, anew: bool = False) -> tuple[Card, ...]:
-        """Show what each card lacks, and return the cards; nothing is read from the disk while nothing has changed."""
+        """Show and return the cards; the disk is read only after a change."""
         source = self.form(), bench, self.screen_fields.status
         if anew or source != self._source:
             self._source = source
@@ -165,7 +165,7 @@ class NewSessionPage(Panel):
         return self._cards
 
     def go_to_missing(self) -> None:
-        """Mark what is missing, bring the card of the headline into sight, and let typing go to the first field."""
+        """Mark what is missing, scroll to the card of the headline, and focus the first field."""
         fields: dict[str, QWidget] = {**self._lines, "protocol": self.protocol}
         gaps = [card for card in self._cards if not card.ready]
         for card in gaps:
@@ -180,7 +180,7 @@ class NewSessionPage(Panel):
         self.cut_short.look_in(self.form().root_folder)
 
     def _show_study(self) -> None:
-        """Show what the study says of the subject: its protocol and its orders were decided when it was made."""
+        """Show the subject's enrolment; the study fixes protocol and orders."""
         record, phases = enrolment(self.form()), optional_phases(self.form())
         self.pre_evaluation.setVisible("pre-evaluation" in phases)
         self.practice.setVisible("practice" in phases)
@@ -192,7 +192,7 @@ class NewSessionPage(Panel):
             widget.setToolTip("" if record is None else tr("the study's own: {protocol}", protocol=record.protocol))
 
     def _speak(self) -> None:
-        """Let the subject's page speak the chosen language before there is a session."""
+        """Show the subject's page in the chosen language before there is a session."""
         self._send(LanguageChosen(self.screen_fields.language.currentData() or ENGLISH))
 
     def _enrol_subject(self) -> None:
@@ -205,13 +205,13 @@ class NewSessionPage(Panel):
 
     def _choose_protocol(self, index: int) -> None:
         if index == self.protocol.count() - 1:
-            self.protocol.setCurrentText(self._protocol)  # until a file is chosen, and where none is
+            self.protocol.setCurrentText(self._protocol)  # until a file is chosen, and if none is
             self.add_protocol(QFileDialog.getOpenFileName(self, tr("Protocol"), "", "Protocol (*.toml)")[0])
         self._protocol = self.protocol.currentText()
         self.changed.emit()
 
     def add_protocol(self, path: str) -> None:
-        """Choose the protocol in a file; where the path is empty the one that was chosen stays."""
+        """Select the protocol in a file; an empty path keeps the selection."""
         if path:
             self.protocol.insertItem(self.protocol.count() - 1, path)
             self.protocol.setCurrentIndex(self.protocol.count() - 2)
@@ -225,15 +225,15 @@ class NewSessionPage(Panel):
             self.look_for_unfinished_sessions()
 
     def _place_changed(self) -> None:
-        """Offer the studies of the folder, and the code after those that were there."""
+        """Offer the studies of the folder, and the next free code."""
         names = ["", *studies_in(self.form().root_folder)]
         if names != [self.studies.itemText(index) for index in range(self.studies.count())]:
-            with QSignalBlocker(self.study):  # what stands in the field stays
+            with QSignalBlocker(self.study):  # keeps the text of the field
                 typed = self.study.text()
                 self.studies.clear()
                 self.studies.addItems(names)
                 self.studies.setEditText(typed)
-            if (completer := self.studies.completer()) is not None:  # as an editable list has
+            if (completer := self.studies.completer()) is not None:  # an editable list has one
                 completer.setCompletionMode(QCompleter.CompletionMode.PopupCompletion)
         code = next_code(codes_in(self.form().parent_folder))
         self.subject.setPlaceholderText(tr("e.g. {code}", code=code))
@@ -285,11 +285,11 @@ class NewSessionPage(Panel):
         set_horizontal(self._columns, self.width() >= px(TWO))
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Propose the code after that of a session that has just ended."""
+        """Propose the next code after a session has ended."""
         self._place_changed()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Look for studies again where the window is turned to: another program may have made one."""
+        """Search for studies again when the window is activated: another program may have made one."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.ActivationChange:
             self._place_changed()

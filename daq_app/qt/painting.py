@@ -1,4 +1,4 @@
-"""What is painted by hand: arrays as shapes, a widget whose ground is painted once, and small marks of a state."""
+"""Painting by hand: arrays as shapes, a widget with a cached background, and small marks of a state."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -14,13 +14,13 @@ from shiboken6 import VoidPtr
 from daq_app.qt.tokens import GRID, LIGHT, Tokens, theme_of
 from drivers.arrays import Array, Indices
 
-_ELEMENT = np.dtype([("kind", ">i4"), ("x", ">f8"), ("y", ">f8")])  # of a path in Qt's own serial form
-_TAIL = (0).to_bytes(4, "big") + (1).to_bytes(4, "big")  # where the last part begins; overlaps are filled
+_ELEMENT = np.dtype([("kind", ">i4"), ("x", ">f8"), ("y", ">f8")])  # of a path in Qt's serial format
+_TAIL = (0).to_bytes(4, "big") + (1).to_bytes(4, "big")  # start of the last subpath; fill rule: overlaps are filled
 Grade = Literal["off", "on", "well", "look", "wrong"]
 
 
 def blank(widget: QWidget, colour: str) -> QPixmap:
-    """Return a picture as large as a widget, in the pixels of its screen: never a pixel short where scaling is odd."""
+    """Return a pixmap of a widget's size in screen pixels, never a pixel short at fractional scaling."""
     ratio = widget.devicePixelRatioF()
     pixmap = QPixmap(ceil(widget.width() * ratio), ceil(widget.height() * ratio))
     pixmap.setDevicePixelRatio(ratio)
@@ -29,7 +29,7 @@ def blank(widget: QWidget, colour: str) -> QPixmap:
 
 
 def paint_fitted(painter: QPainter, picture: QPixmap) -> QRect:
-    """Paint a picture at the top, as large as there is room and its proportions kept; return where it is."""
+    """Paint a picture at the top, as large as fits with its proportions; return its rectangle."""
     window, ratio = painter.window(), painter.device().devicePixelRatioF()
     smooth = Qt.TransformationMode.SmoothTransformation
     pixmap = picture.scaled(window.size() * ratio, Qt.AspectRatioMode.KeepAspectRatio, smooth)
@@ -41,21 +41,21 @@ def paint_fitted(painter: QPainter, picture: QPixmap) -> QRect:
 
 
 def sheer(colour: str, alpha: int) -> QColor:
-    """Return a colour that lets what is behind it through, from 0 all of it to 255 nothing."""
+    """Return a colour with transparency, from 0 (transparent) to 255 (opaque)."""
     shade = QColor(colour)
     shade.setAlpha(alpha)
     return shade
 
 
 def fine(colour: str | QColor, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> QPen:
-    """Return a pen one pixel of the screen wide, whatever the scaling."""
+    """Return a pen one screen pixel wide at any scaling."""
     pen = QPen(QColor(colour), 1, style)
     pen.setCosmetic(True)
     return pen
 
 
 def draw_line(painter: QPainter, x: Array, y: Array) -> None:
-    """Draw the line through points (n,) with a fine pen, two pixels of the screen high.
+    """Draw the line through points (n,) with a fine pen, two screen pixels high.
 
     It is drawn twice, a pixel apart: a pen of two pixels takes a hundred times as long.
     """
@@ -69,7 +69,7 @@ def draw_line(painter: QPainter, x: Array, y: Array) -> None:
 
 
 def lines(x: Array, y: Array) -> list[QPolygonF]:
-    """Return the line through points (n,) in pieces: it is broken where a coordinate is nan."""
+    """Return the line through points (n,) in pieces, broken where a coordinate is nan."""
     points = np.empty((len(x), 2))
     points[:, 0], points[:, 1] = x, y
     finite = np.zeros(len(x) + 2, np.bool_)
@@ -79,36 +79,36 @@ def lines(x: Array, y: Array) -> list[QPolygonF]:
 
 
 def _polygon(points: Array) -> QPolygonF:
-    """Return points (n, 2), n > 0, as Qt holds them: written into its own memory, as pyqtgraph does it."""
+    """Return a polygon of points (n, 2), n > 0, written directly into Qt's memory, as in pyqtgraph."""
     polygon = QPolygonF()
     polygon.resize(len(points))
-    # VoidPtr's stub does not know these arguments.
+    # VoidPtr's stub lacks these arguments.
     memory: Any = VoidPtr(polygon.data(), points.nbytes, True)  # pyrefly: ignore[bad-argument-type, bad-argument-count]
     np.frombuffer(memory, np.float64).reshape(-1, 2)[:] = points
     return polygon
 
 
 def faces(corners: Array, shades: Indices) -> Iterator[tuple[int, QPainterPath]]:
-    """Return closed polygons (f, k, 2) as one path for each of their shades (f,), to be filled at once."""
+    """Yield closed polygons (f, k, 2) as one path for each shade (f,), to be filled together."""
     order = np.argsort(shades, kind="stable")
     sorted_shades = shades[order]
     elements = np.empty(corners.shape[:2], _ELEMENT)
-    elements["kind"] = 1  # draws a line to it ...
-    elements["kind"][:, 0] = 0  # ... or restarts there
+    elements["kind"] = 1  # a line to the point ...
+    elements["kind"][:, 0] = 0  # ... or a new subpath there
     elements["x"], elements["y"] = corners[order, :, 0], corners[order, :, 1]
     edges = np.flatnonzero(np.diff(sorted_shades, prepend=-1, append=-1)).tolist()
     for begin, end in pairwise(edges):
         polygons = elements[begin:end]
         path = QPainterPath()
         stream = QDataStream(QByteArray(polygons.size.to_bytes(4, "big") + polygons.tobytes() + _TAIL))
-        stream >> path  # it reads into `path`
+        stream >> path  # reads into `path`
         yield int(sorted_shades[begin]), path
 
 
 def fill_faces(
     painter: QPainter, corners: Array, fraction: Array, shades: Sequence[QColor], *, edges: bool = False
 ) -> None:
-    """Fill polygons (f, k, 2), each in the shade at its fraction (f,) of them all; with `edges` their sides too."""
+    """Fill polygons (f, k, 2), each with the shade at its fraction (f,) of `shades`; with `edges` their sides too."""
     shade = (np.clip(np.nan_to_num(fraction), 0.0, 1.0) * (len(shades) - 1)).astype(np.int64)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
     for number, path in faces(corners, shade):
@@ -120,12 +120,12 @@ def fill_faces(
 
 
 class PaintedWidget(QWidget):
-    """Takes all the room there is; a subclass paints the ground, and in its `paintEvent` upon it."""
+    """Fills its room; a subclass paints the background, and on it in its `paintEvent`."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._ground: QPixmap | None = None  # what stands still ...
-        self.theme = LIGHT  # ... and the theme in which it was painted
+        self._ground: QPixmap | None = None  # the static background ...
+        self.theme = LIGHT  # ... and its theme
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # nothing behind it needs painting
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
@@ -133,12 +133,12 @@ class PaintedWidget(QWidget):
         self.redraw()
 
     def redraw(self) -> None:
-        """Redraw everything, the ground too."""
+        """Redraw everything, including the background."""
         self._ground = None
         self.update()
 
     def painter_on_ground(self) -> QPainter:
-        """Return a painter at work on the widget, the ground already there."""
+        """Return an active painter on the widget, after painting the background."""
         ratio, theme = self.devicePixelRatioF(), theme_of(self)
         if self._ground is None or self._ground.devicePixelRatio() != ratio or theme is not self.theme:
             self.theme = theme
@@ -148,12 +148,12 @@ class PaintedWidget(QWidget):
         return painter
 
     def draw_ground(self) -> QPixmap:
-        """Return what stands still, as large as the widget."""
+        """Return the static background in the widget's size."""
         raise NotImplementedError
 
 
 class Lamp(QWidget):
-    """A lamp: a ring when off, a disc when well or recording, a triangle to look at, a square when wrong."""
+    """A lamp: a ring when off, a disc when well or recording, a triangle for attention, a square when wrong."""
 
     def __init__(self, name: str) -> None:
         super().__init__()
@@ -189,7 +189,7 @@ class Lamp(QWidget):
 
 
 def paint_arrow(painter: QPainter, x: float, tail: float, tip: float, wing: QPointF) -> None:
-    """Paint an upright arrow; `wing` is how far aside and back from the tip its two short lines end [pixel]."""
+    """Paint an upright arrow; `wing` is the offset of its barbs' ends, aside and back from the tip [pixel]."""
     back = wing.y() if tail > tip else -wing.y()
     painter.drawLine(QPointF(x, tail), QPointF(x, tip))
     for side in (-wing.x(), wing.x()):
@@ -197,7 +197,7 @@ def paint_arrow(painter: QPainter, x: float, tail: float, tip: float, wing: QPoi
 
 
 def mark_failed_solve(painter: QPainter, centre: QPointF, tokens: Tokens) -> None:
-    """Mark the place of a failed solve, on any ground: a ring with a cross."""
+    """Mark the point of a failed solve, visible on any background: a ring with a cross."""
     painter.setBrush(Qt.BrushStyle.NoBrush)
     for colour, width in ((tokens.surface, 5.0), (tokens.wrong, 2.5)):
         painter.setPen(QPen(QColor(colour), width))
