@@ -1,4 +1,4 @@
-"""The simulated bench: a stimulus on a six-axis transducer, a finger that strokes it, and the wrench measured."""
+"""The simulated bench: a stimulus on a six-axis transducer, a finger that strokes it, and the measured wrench."""
 
 import threading
 from dataclasses import dataclass
@@ -20,8 +20,8 @@ from simulators.stroke import CONTACT_AREA, PRESS, RELEASE, Course, Stroke, Surf
 def _white_noise(seed: int, times: Array, channels: int = 6) -> Array:
     """Return noise (n, channels) of mean 0 and standard deviation 1 at `times` (n,) [s].
 
-    Instants in the same microsecond share their noise. The hash is SplitMix64 (Steele, Lea, Flood, 2014), keyed by
-    the seed and counted by instant and channel; the normal deviate is the inverse of the distribution at that point.
+    Instants in the same microsecond share their noise. The hash is SplitMix64 (Steele, Lea, Flood, 2014), keyed by the
+    seed and indexed by instant and channel; the inverse normal distribution gives the deviates.
     """
     instants = np.rint(times * 1e6).astype(np.int64).astype(np.uint64)
     counter = instants[:, None] * np.uint64(channels) + np.arange(channels, dtype=np.uint64)
@@ -30,7 +30,7 @@ def _white_noise(seed: int, times: Array, channels: int = 6) -> Array:
     bits = (bits ^ (bits >> np.uint64(27))) * np.array([0x94D049BB133111EB], np.uint64)
     bits ^= bits >> np.uint64(31)
     uniform = ((bits >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
-    deviates = map(NormalDist().inv_cdf, uniform.ravel().tolist())  # SciPy's is faster, and takes 0.2 s to load
+    deviates = map(NormalDist().inv_cdf, uniform.ravel().tolist())  # SciPy's is faster, but takes 0.2 s to load
     return np.fromiter(deviates, np.float64, uniform.size).reshape(uniform.shape)
 
 
@@ -46,23 +46,23 @@ RATED: Six = (36.0, 36.0, 36.0, 500.0, 500.0, 500.0)  # an SI-36-0.5 calibration
 
 @dataclass(frozen=True, slots=True)
 class BenchSettings:
-    """How good the bench is. Forces are in N, torques in N mm."""
+    """Errors of the bench. Forces are in N, torques in N mm."""
 
     noise_force: float = 0.004  # standard deviation of the white noise of each force [N]
     noise_torque: float = 0.05  # and of each torque [N mm]
-    drift_force: float = 0.010  # no force drifts further than this from its zero [N]
-    drift_torque: float = 0.1  # no torque drifts further than this [N mm]
-    drift_period: tuple[float, float] = (120.0, 600.0)  # each axis drifts to and fro with a period between these [s]
+    drift_force: float = 0.010  # largest drift of a force from its zero [N]
+    drift_torque: float = 0.1  # largest drift of a torque from its zero [N mm]
+    drift_period: tuple[float, float] = (120.0, 600.0)  # limits of the period of each axis' sinusoidal drift [s]
     offset: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # unloaded reading: weight of the plate, strain of the mounting
-    gains: Six = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)  # sensed over true; 1 where the calibration is exact [-]
+    gains: Six = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)  # measured over true; 1 with an exact calibration [-]
     tilt: tuple[float, float] = (0.0, 0.0)  # of the stimulus about the transducer's x and y axes [degrees]
-    height: float = 20.0  # the stimulus's face above the transducer's origin [mm]
-    rated: Six = RATED  # beyond this an axis saturates
+    height: float = 20.0  # of the stimulus's face above the transducer's origin [mm]
+    rated: Six = RATED  # limits at which an axis saturates
 
 
 @dataclass(frozen=True, slots=True)
 class StrokeGroundTruth:
-    """What was truly done in one stroke. Times are the bench's [s]."""
+    """Ground truth of one stroke. Times are the bench's [s]."""
 
     surface: Surface
     mu: float  # [-]
@@ -70,29 +70,29 @@ class StrokeGroundTruth:
     peak_normal_force: float  # [N]
     speed: float  # mean over the steady slide [mm/s]
     direction: int
-    touch: float  # first contact
+    touch: float  # start of contact
     onset: float  # the true N first exceeds three standard deviations of the noise
-    slip: float  # the whole contact slides from here on
+    slip: float  # instant from which the whole contact slides
     peak: float  # of the normal force
     steady: tuple[float, float]  # full speed and full press
     lift: float  # the true N last exceeds three standard deviations of the noise
-    end: float  # last contact
+    end: float  # end of contact
 
 
 class Bench:
-    """One transducer with whatever is mounted on it. Time counts from where its user says; threads may share it.
+    """One transducer with a mounted stimulus. The user defines time 0; threads may share the bench.
 
-    The wrench is what the finger exerts on the stimulus in the transducer's frame: x from proximal to distal, z out
-    of the face, so that pressing is Fz < 0. Noise is a function of the seed and the instant asked about.
+    The wrench is that of the finger on the stimulus in the transducer's frame: x from proximal to distal, z out of the
+    face, so pressing is Fz < 0. Noise is a function of the seed and the instant.
     """
 
     def __init__(self, seed: int = 0, settings: BenchSettings | None = None) -> None:
         self.settings = settings or BenchSettings()
         self.seed = seed
-        self.serial = f"SIM{seed:05d}"  # of the transducer, where it has a wire
+        self.serial = f"SIM{seed:05d}"  # of the transducer, on simulated wires
         self._lock = threading.Lock()
         self._surface: Surface | None = None
-        # Beginning [s], course and truth of each stroke; in order, never overlapping. Replaced, never changed.
+        # Beginning [s], course and ground truth of each stroke; in order, never overlapping. Replaced, never mutated.
         self._strokes: tuple[tuple[float, Course, StrokeGroundTruth], ...] = ()
         self._rotation = _rotation(*self.settings.tilt)
         draw = np.random.default_rng([seed, 1])
@@ -102,12 +102,12 @@ class Bench:
         self._drift_phase = draw.uniform(0.0, 2 * np.pi, 6)
 
     def mount(self, surface: Surface) -> None:
-        """Put a stimulus on the transducer; later strokes rub on it."""
+        """Put a stimulus on the transducer, for later strokes."""
         with self._lock:
             self._surface = surface
 
     def begin_stroke(self, stroke: Stroke, time: float) -> StrokeGroundTruth:
-        """Begin a stroke at `time` [s]; return its truth. Raises ValueError with nothing mounted, or during another."""
+        """Begin a stroke at `time` [s]; return its truth. Raises ValueError without a stimulus, or during a stroke."""
         with self._lock:
             surface = self._surface
             if surface is None:
@@ -124,7 +124,7 @@ class Bench:
         return tuple(ground_truth for _, _, ground_truth in self._strokes)
 
     def true_wrench(self, times: Array) -> Array:
-        """Return the wrench (n, 6) [N, N mm] that the finger truly exerts at `times` (n,) [s], without any error."""
+        """Return the wrench (n, 6) [N, N mm] exerted by the finger at `times` (n,) [s], without any error."""
         wrench = np.zeros((len(times), 6))
         if not len(times):
             return wrench
@@ -138,7 +138,7 @@ class Bench:
         return np.hstack([forces @ self._rotation.T, torques @ self._rotation.T])
 
     def wrench(self, times: Array) -> Array:
-        """Return the wrench (n, 6) [N, N mm] that the transducer feels at `times` (n,) [s], noise and drift too."""
+        """Return the wrench (n, 6) [N, N mm] measured at `times` (n,) [s], with noise and drift."""
         settings = self.settings
         wrench = self.true_wrench(times) * np.array(settings.gains) + np.array(settings.offset)
         wrench += self._drift_size * np.sin(self._drift_rate * times[:, None] + self._drift_phase)
@@ -171,7 +171,7 @@ class Bench:
 
 
 def _course_wrench(course: Course, time: Array, height: float) -> Array:
-    """Return the wrench (n, 6) of a course about the transducer's origin; the face lies `height` [mm] above it."""
+    """Return the wrench (n, 6) of a course about the transducer's origin; the face is `height` [mm] above it."""
     stroke = course.stroke
     normal = course.normal_force(time)
     tangential = course.ratio(time) * normal
@@ -184,7 +184,7 @@ def _course_wrench(course: Course, time: Array, height: float) -> Array:
 
 
 def _rotation(about_x: float, about_y: float) -> Array:
-    """Return the matrix (3, 3) that turns the stimulus's axes about x, then about y [degrees]."""
+    """Return the matrix (3, 3) that rotates the stimulus's axes about x, then about y [degrees]."""
     (sx, cx), (sy, cy) = ((np.sin(angle), np.cos(angle)) for angle in np.radians([about_x, about_y]))
     turn_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
     turn_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
@@ -205,7 +205,7 @@ FT32831 = np.array(
 
 
 def calibration_file(folder: Path, serial: str) -> Path:
-    """Write the maker's file for simulated gauges of that serial number; return where."""
+    """Write the maker's calibration file for simulated gauges with a serial number; return its path."""
     axes = "".join(
         f'<Axis Name="{name}" values="{" ".join(map(repr, row))}" max="{rated}" scale="1"/>\n'
         for name, row, rated in zip(("Fx", "Fy", "Fz", "Tx", "Ty", "Tz"), FT32831.tolist(), RATED, strict=True)
@@ -222,18 +222,18 @@ def calibration_file(folder: Path, serial: str) -> Path:
 
 
 _RATE = 200.0  # readings a second
-_MIDDLE = (0.3, 0.7)  # part of a stroke's slide that is lost or frozen [-]
+_MIDDLE = (0.3, 0.7)  # range of a stroke's slide that is lost or frozen [-]
 _SCALE = np.array([1e-6] * 3 + [1e-3] * 3)  # one count [N, N mm]
 
 
 class DirectTransducer:
-    """The bench as a transducer without a wire; it reads whatever simulated time has brought, for studies in seconds.
+    """The bench as a transducer without a wire, on simulated time, for studies within seconds.
 
-    Readings never arrive, or repeat one, in the middle of a stroke: those of its number on the bench, from 1.
+    Readings are lost, or repeat one, in the middle of a chosen stroke, numbered on the bench from 1.
     """
 
     def __init__(self, bench: Bench, clock: Clock, *, lost: int = 0, frozen: int = 0) -> None:
-        """Feel `bench`, whose time begins with the stream. Stroke `lost` is not whole, stroke `frozen` stands still."""
+        """Measure `bench`, whose time begins with the stream. Stroke `lost` loses readings, `frozen` repeats one."""
         calibration = Calibration(
             f"SIM{bench.seed}", "counts", np.diag(_SCALE), np.array(RATED), "of the simulated bench"
         )
@@ -287,7 +287,7 @@ class DirectTransducer:
         return int(self.now() * _RATE) + 1
 
     def _middle(self, number: int) -> tuple[float, float]:
-        """Return the middle stretch [s, bench] of a stroke that was begun; nothing of another number."""
+        """Return the middle stretch [s, bench] of a stroke that has begun; infinite times for another number."""
         truths = self._bench.ground_truth()
         if not 0 < number <= len(truths):
             return np.inf, np.inf

@@ -1,7 +1,7 @@
 """The RS-485 transducer on a pseudo-terminal.
 
-Registers, frames and packets after its manual (9620-05-Digital FT, chapter 8) as a published driver gives them, packed
-here and nowhere else. How long a jam must be, and how long the transducer is deaf after it, is not verified.
+Registers, frames and packets follow its manual (9620-05-Digital FT, chapter 8) as cited by a published driver, and are
+packed here only. The required length of a jam, and the deaf time after it, are not verified.
 """
 
 import struct
@@ -16,23 +16,23 @@ from simulators.simulator import ROOM, LineBox, PseudoTerminal, Simulator, serve
 
 _RATE = 7000  # packets a second
 COUNTS_PER_VOLT = 3000.0  # of a gauge
-_COUNTS = 1_000_000  # in one N and in one N m, of what the stored matrix gives
+_COUNTS = 1_000_000  # per N and per N m, of the stored matrix's results
 _SIZE = 3_400  # registers
 _STATUS = 0x001D
 _CALIBRATION = 0x00E3  # the first register of calibration 1
-_GAINS_AND_OFFSETS = (*range(1000, 1006), *range(32_000, 32_006))  # as calibration 1 wants them
-_JAM = 14  # bytes heard while streaming that end the stream
+_GAINS_AND_OFFSETS = (*range(1000, 1006), *range(32_000, 32_006))  # of calibration 1
+_JAM = 14  # bytes received while streaming that end the stream
 _DEAF = 0.3  # after a jam [s]
 _START_UP = 0.2  # after power-up [s]
 _NAP = 0.005  # longest wait [real s]
 _SHORTEST_NAP = 0.001
-_BURST = ROOM // 13  # packets at one go after the computer was busy: as many as are kept for a late reader
+_BURST = ROOM // 13  # most packets in one send after the computer was busy: the buffer of a late reader
 
 
 class DigitalFtBox(LineBox):
-    """A transducer with a simulated bench behind it. Its time, and the bench's, begins when it is started.
+    """A transducer with a simulated bench behind it. Its time and the bench's begin when it is started.
 
-    It holds one calibration, as number 1, whose part number says that it is simulated.
+    It holds one calibration, number 1, with a part number that marks it as simulated.
     """
 
     def __init__(
@@ -44,12 +44,12 @@ class DigitalFtBox(LineBox):
         faults: Faults | None = None,
         streaming: bool = False,
     ) -> None:
-        """Set up a transducer whose sampling is wrong by `rate_error` [-], perhaps left `streaming` by somebody."""
+        """Set up a transducer whose rate has the error `rate_error` [-], possibly still `streaming` from before."""
         super().__init__("ttyDigitalFT", clock, faults)
         self._bench = bench
         self._rate = _RATE * (1.0 + rate_error)
         self._rated = np.array(bench.settings.rated)
-        self._gauges = np.linalg.inv(FT32831) * COUNTS_PER_VOLT  # counts for one N or N mm
+        self._gauges = np.linalg.inv(FT32831) * COUNTS_PER_VOLT  # counts per N or N mm
         self._memory = self._calibration()
         self.power_up(0.0)
         self._deaf_until = 0.0
@@ -57,7 +57,7 @@ class DigitalFtBox(LineBox):
 
     @property
     def uri(self) -> str:
-        """The address to open it at; known once it is started. Pseudo-terminals carry no parity."""
+        """Its address, known once it is started. Pseudo-terminals have no parity."""
         return f"digital-ft://{self.path}?parity=none"
 
     def _calibration(self) -> bytes:
@@ -78,12 +78,12 @@ class DigitalFtBox(LineBox):
         self._inbox = bytearray()
         self._streaming_since: float | None = None
         self._sent = 0  # packets of this stream
-        self._jammed_by = 0  # bytes heard while streaming
+        self._jammed_by = 0  # bytes received while streaming
         self._deaf_until = now + _START_UP
         self._last = bytes(13)
 
     def work(self, port: PseudoTerminal, now: float) -> None:
-        """Send packets and answer requests; while it streams, whatever is heard jams it."""
+        """Send packets and answer requests; any byte received while it streams jams it."""
         self._send_due(port, now)
         data = port.receive(_NAP if self._streaming_since is None else _SHORTEST_NAP)
         if self._streaming_since is not None:
@@ -116,7 +116,7 @@ class DigitalFtBox(LineBox):
         return packets
 
     def _answers(self) -> bytes:
-        """Return the answers to all whole requests heard; what is none is forgotten."""
+        """Return the answers to all whole requests received; other bytes are dropped."""
         answers = b""
         while len(self._inbox) >= 5:
             function = self._inbox[1]
@@ -156,7 +156,7 @@ class DigitalFtBox(LineBox):
 
 
 def _crc(frame: bytes) -> bytes:
-    """Return the two bytes that close a Modbus RTU frame."""
+    """Return the two check bytes that end a Modbus RTU frame."""
     crc = 0xFFFF
     for byte in frame:
         crc ^= byte
@@ -170,6 +170,6 @@ SIMULATOR = Simulator(
     serve_on_ports(DigitalFtBox),
     factor=0.25,
     statuses=(sum(1 << n for n in (*range(6), 7, *range(8, 14))),),
-    unshown=0.2,  # a sum of seven bits
+    unshown=0.2,  # a seven-bit checksum
     at_start=True,
 )

@@ -1,4 +1,4 @@
-"""What can go wrong on the way from a box, and in the box, on a timetable and from a seed."""
+"""Faults of a box and on the way from it, by a timetable and a seed."""
 
 import heapq
 from collections.abc import Iterable, Sequence
@@ -22,17 +22,17 @@ Time = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]  # in a timetable file [s]
 
 
 class Fault(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One kind of fault for a stretch of the box's time. `docs/how-to/simulate-a-box.md` says what each kind does.
+    """One kind of fault during a stretch of the box's time. `docs/how-to/simulate-a-box.md` describes each kind.
 
-    The first six of KINDS befall datagrams on the way, the others the box itself.
+    The first six of `FAULT_KINDS` affect datagrams on the way, the others the box itself.
     """
 
     kind: Kind
     start: Time = msgspec.field(name="from")
     stop: Time = msgspec.field(name="to")
-    share: float = 1.0  # of the datagrams in the stretch, or how far the box goes wrong [-]
-    delay: float = 0.05  # of a datagram that is delayed [s]
-    status: int = 0  # bits that are set
+    share: float = 1.0  # share of the datagrams in the stretch, or size of the box's error [-]
+    delay: float = 0.05  # of a delayed datagram [s]
+    status: int = 0  # bits to set
 
     def __post_init__(self) -> None:
         if self.kind not in FAULT_KINDS:
@@ -46,7 +46,7 @@ class Fault(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Faults:
-    """The timetable of one box. The same seed hurts the same datagrams in the same way."""
+    """The timetable of one box. The same seed affects the same datagrams in the same way."""
 
     def __init__(self, timetable: Iterable[Fault] = (), *, seed: int = 0, repeat: float = 0.0) -> None:
         """Repeat the timetable every `repeat` seconds, if above 0."""
@@ -55,25 +55,25 @@ class Faults:
         self._repeat = repeat
         self._clock = _device_clock(self._timetable, repeat)
         self._swap: bytes | None = None
-        self._delays: list[tuple[float, bytes]] = []  # times at which they are sent [s], and their bytes
+        self._delays: list[tuple[float, bytes]] = []  # departures [s] and bytes of delayed datagrams
 
     def put(self, *timetable: Fault) -> None:
-        """Let this go wrong from now on, and nothing else. A device that was `slow` stays so."""
+        """Replace the timetable by these faults. A device that is `slow` stays so."""
         slow = tuple(fault for fault in self._timetable if fault.kind == "slow")
         self._timetable = (*slow, *timetable)
         self._clock = _device_clock(self._timetable, self._repeat)
 
     def active(self, kind: Kind, time: float) -> bool:
-        """Tell whether a fault of the box itself is on at `time` [s]."""
+        """Say whether a fault of the box itself is active at `time` [s]."""
         return self._active_fault(kind, time) is not None
 
     def status(self, time: float) -> int:
-        """Return the status bits the box sets at `time` [s] beyond its own."""
+        """Return the additional status bits of the box at `time` [s]."""
         fault = self._active_fault("status", time)
         return 0 if fault is None else fault.status
 
     def count_factor(self, time: float) -> float:
-        """Return how many times as much as at first the box counts to a unit at `time` [s]."""
+        """Return the factor of the box's counts per unit at `time` [s], relative to the start."""
         fault = self._active_fault("units", time)
         return 1.0 if fault is None else fault.share
 
@@ -82,26 +82,26 @@ class Faults:
         return times if self._clock is None else _through(times, *self._clock)
 
     def instants(self, ages: Array) -> Array:
-        """Return when (n,) [s] the device's own clock has come as far as `ages` (n,) [s]."""
+        """Return the times (n,) [s] at which the device's own clock reaches `ages` (n,) [s]."""
         return ages if self._clock is None else _through(ages, *reversed(self._clock))
 
     def during(self, kind: Kind, times: Array) -> Mask:
-        """Tell of `times` (n,) [s] whether a fault of the box itself is on."""
+        """Mark the `times` (n,) [s] at which a fault of the box itself is active."""
         return np.array([self.active(kind, time) for time in times.tolist()], np.bool_)
 
     def due(self, start: float, now: float, rate: float, previous: int, most: int = 2**31) -> tuple[Array, int]:
-        """Return when (n,) [s] the next records of a stream since `start` [s] were due by `now`, and their number.
+        """Return the due times (n,) [s], up to `now`, of the next records of a stream since `start`, and their total.
 
-        `previous` records were sent before, and count in that number. The device's own clock gives `rate` records a
-        second. Of more than `most` at one go the first are left out: a line would have carried on while the computer
-        was busy.
+        `previous` records were sent before, and count in the total. The device's own clock gives `rate` records a
+        second. Of more than `most` in one call the first are omitted: a real line would have sent them while the
+        computer was busy.
         """
         since, age = self.device_time(np.array([start, now])).tolist()
         total = max(int((age - since) * rate), previous)
         return self.instants(since + np.arange(max(previous, total - most), total) / rate), total
 
     def sensed_wrench(self, bench: Bench, times: Array) -> Array:
-        """Return the wrench (n, 6) that a drifting or wrongly calibrated device senses at `times` (n,) [s]."""
+        """Return the wrench (n, 6) measured by a drifting or wrongly calibrated device at `times` (n,) [s]."""
         wrench = bench.wrench(times)
         local = times % self._repeat if self._repeat > 0.0 else times
         for fault in self._timetable:
@@ -114,7 +114,7 @@ class Faults:
         return wrench
 
     def route(self, now: float, datagrams: Iterable[tuple[float, bytes]]) -> list[bytes]:
-        """Return what leaves by `now` [s] of `datagrams`, each at its time [s], and of those held back before."""
+        """Return what departs by `now` [s]: of `datagrams`, each at its time [s], and of earlier delayed ones."""
         departures: list[bytes] = []
         for time, datagram in datagrams:
             departures += self._overdue(time)
@@ -130,7 +130,7 @@ class Faults:
         return datagrams
 
     def _hurt(self, time: float, datagram: bytes) -> list[bytes]:
-        """Return what becomes of one datagram, in the order it leaves."""
+        """Return the datagrams that replace one datagram, in order of departure."""
         datagrams = [datagram]
         for kind in _ON_THE_WAY:
             fault = self._active_fault(kind, time)
@@ -166,14 +166,14 @@ class Faults:
 
     def _active_fault(self, kind: Kind, time: float) -> Fault | None:
         local = time % self._repeat if self._repeat > 0.0 else time
-        for fault in self._timetable:  # a generator would take most of the box's time: a record asks a dozen times
+        for fault in self._timetable:  # a generator would take most of the box's time: a dozen calls for each record
             if fault.kind == kind and fault.start <= local < fault.stop:
                 return fault
         return None
 
 
 def _device_clock(timetable: Sequence[Fault], repeat: float) -> tuple[Array, Array] | None:
-    """Return knots of time and of the device's own clock [s] over a round of the timetable; None where they agree."""
+    """Return knots of time and of the device's own clock [s] over one cycle of the timetable; None where they agree."""
     slow = [fault for fault in timetable if fault.kind == "slow"]
     if not slow:
         return None
@@ -187,7 +187,7 @@ def _device_clock(timetable: Sequence[Fault], repeat: float) -> tuple[Array, Arr
 
 
 def _through(values: Array, nodes: Array, sought: Array) -> Array:
-    """Return where (n,) the line through the knots lies, which is restarted at its end as often as needed."""
+    """Interpolate `sought` over `nodes` at `values` (n,), periodically continued beyond the last node."""
     rounds = np.floor(values / nodes[-1])
     within = np.array(np.interp(values - rounds * nodes[-1], nodes, sought), np.float64)
     return within + rounds * float(sought[-1])

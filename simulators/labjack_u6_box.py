@@ -1,6 +1,6 @@
-"""A LabJack U6 with a simulated transducer on its inputs, and a USB bus with such converters as pyusb sees one.
+"""A LabJack U6 with a simulated transducer on its inputs, and a simulated USB bus with such converters for pyusb.
 
-Commands, memory and stream after LabJack's U6 User's Guide (sections 3.2 and 5), packed here and nowhere else.
+Commands, memory and stream follow LabJack's U6 User's Guide (sections 3.2 and 5), and are packed here only.
 """
 
 import errno
@@ -22,9 +22,9 @@ from simulators.bench import FT32831, Bench, calibration_file
 from simulators.faults import Faults
 from simulators.simulator import RunningSimulator, Simulator, stopwatch, unplug
 
-_ROOM = 984  # readings the converter keeps for a computer that is late
+_ROOM = 984  # buffer of the converter for a late computer [readings]
 _NAP = 0.0005  # [real s]
-_VOLTS_PER_CODE = 3.1572e-4  # this unit's, near the nominal 3.1580578e-4
+_VOLTS_PER_CODE = 3.1572e-4  # of this unit, near the nominal 3.1580578e-4
 _VOLTS_PER_CODE_BELOW = -3.1585e-4
 _ZERO_CODE = 33519.5
 _OFFSETS = np.array([0.31, -0.12, 0.85, 0.06, -0.44, 0.2])  # of the mounted gauges [V]
@@ -32,20 +32,20 @@ _NOTHING_STREAMS = 52
 
 
 class LabJackU6Box:
-    """One converter. Its time, and the bench's, begins when it is made; it is switched by whoever plugs it in."""
+    """One converter. Its time and the bench's begin at its creation; plugging it in switches it on."""
 
     def __init__(self, bench: Bench, clock: Clock, *, serial: int = 360_000_001, faults: Faults | None = None) -> None:
         self.bench = bench
         self.serial = serial
-        self.now = stopwatch(clock)  # the box's and the bench's time [s]
+        self.now = stopwatch(clock)  # time of the box and the bench [s]
         self._faults = faults or Faults()
-        self._gauges = np.linalg.inv(FT32831)  # V for one N or N mm
+        self._gauges = np.linalg.inv(FT32831)  # V per N or N mm
         self._lock = threading.Lock()
         self._switch_on()
 
     @property
     def is_plugged(self) -> bool:
-        """Whether the computer sees it; it loses its power with the plug."""
+        """Whether it is plugged in; without the plug it has no power."""
         away = any(self._faults.active(fault, self.now()) for fault in ("unplug", "reboot"))
         if away:
             with self._lock:
@@ -53,7 +53,7 @@ class LabJackU6Box:
         return not away
 
     def command(self, request: bytes) -> None:
-        """Take a request; its answer is ready at once."""
+        """Take a request; its answer is ready immediately."""
         with self._lock:
             self._answer = self._respond(request)
 
@@ -64,7 +64,7 @@ class LabJackU6Box:
         return answer
 
     def stream_packet(self, patience: float) -> bytes | None:
-        """Return the next stream packet, or None when none came within `patience` real seconds."""
+        """Return the next stream packet, or None without one within `patience` real seconds."""
         deadline = time.monotonic() + patience
         while True:
             with self._lock:
@@ -78,12 +78,12 @@ class LabJackU6Box:
 
     def _switch_on(self) -> None:
         self._answer: bytes | None = None
-        self._scan: tuple[list[int], int, float] | None = None  # channels, readings a packet, scans a second
+        self._scan: tuple[list[int], int, float] | None = None  # channels, readings per packet, scans per second
         self._streams = False
-        self._buffer: list[int] = []  # codes converted and not sent
+        self._buffer: list[int] = []  # codes converted and not yet sent
         self._outbox: list[bytes] = []
-        self._lost_scans = 0  # scans thrown away since the buffer was full
-        self._report: tuple[int, int] | None = None  # where in the buffer scans are missing, and how many
+        self._lost_scans = 0  # scans dropped since the buffer is full
+        self._report: tuple[int, int] | None = None  # position in the buffer where scans are missing, and their number
 
     def _respond(self, request: bytes) -> bytes:
         if request == b"\xa8\xa8":
@@ -115,7 +115,7 @@ class LabJackU6Box:
         return bytes(data)
 
     def _memory(self, block: int) -> bytes:
-        """Return four numbers of 32 bits before and 32 behind the point."""
+        """Return four numbers with 32 bits before and 32 bits after the binary point."""
         gains = (1.0, 0.1, 0.01, 0.001)
         first = 0 if block in (0, 2) else 2
         numbers = [0.0] * 4
@@ -145,19 +145,19 @@ class LabJackU6Box:
     def _begin(self) -> None:
         self._streams = True
         self._start_time = self.now()
-        self._scan_count = 0  # scans converted since
+        self._scan_count = 0  # scans converted since the start
         self._sent = 0  # packets of this stream
         self._buffer, self._outbox, self._lost_scans, self._report = [], [], 0, None
 
     def _convert(self) -> None:
-        """Convert what is due. A full buffer throws the newest away until half of it is sent, then says how many."""
+        """Convert due scans. A full buffer drops new ones until half of it is sent, then reports their number."""
         if not self._streams or self._scan is None:
             return
         gauges, _, rate = self._scan
         times, self._scan_count = self._faults.due(self._start_time, self.now(), rate, self._scan_count)
         room = (_ROOM - len(self._buffer)) // len(gauges)
         if self._lost_scans and self._report is None and room > _ROOM // len(gauges) // 2:
-            # One scan of ones stands for those lost; the guide counts it among them.
+            # One scan of ones replaces the lost ones; the guide counts it among them.
             self._report = (len(self._buffer), self._lost_scans)
             self._buffer += [0xFFFF] * len(gauges)
             self._lost_scans = 0
@@ -166,7 +166,7 @@ class LabJackU6Box:
         self._buffer += self._codes(times[:count])[:, gauges].ravel().tolist()
 
     def _send(self) -> None:
-        """Pack what fills a packet; while some are missing packets say 59, the one with the number says 60."""
+        """Pack a full packet; packets have error 59 while scans are missing, and 60 with their number."""
         if self._outbox or self._scan is None or len(self._buffer) < (samples := self._scan[1]):
             return
         codes, self._buffer = self._buffer[:samples], self._buffer[samples:]
@@ -204,7 +204,7 @@ def _sums_agree(request: bytes) -> bool:
 
 
 def _checksum8(data: bytes) -> int:
-    """Return the checksum of one byte: the sum of the bytes, its carry added twice."""
+    """Return the checksum of one byte: the sum of the bytes with its carry added twice."""
     total = sum(data)
     total = total // 256 + total % 256
     return total // 256 + total % 256
@@ -213,7 +213,7 @@ def _checksum8(data: bytes) -> int:
 _core: Any = usb.core
 _Backend: Any = usb.backend.IBackend
 _ENDPOINTS = (0x01, 0x82, 0x83)
-# Fields of the descriptors, as the USB specification names and orders them.
+# Fields of the descriptors, in the order of the USB specification.
 _DEVICE = (
     "bLength bDescriptorType bcdUSB bDeviceClass bDeviceSubClass bDeviceProtocol bMaxPacketSize0 idVendor idProduct "
     "bcdDevice iManufacturer iProduct iSerialNumber bNumConfigurations"
@@ -229,19 +229,19 @@ _ENDPOINT = "bLength bDescriptorType bEndpointAddress bmAttributes wMaxPacketSiz
 
 
 def _descriptor(names: str, values: Sequence[int], **further: object) -> SimpleNamespace:
-    """Return a descriptor with its fields by name, and what pyusb wants `further`."""
+    """Return a descriptor with its fields by name, and `further` attributes for pyusb."""
     return SimpleNamespace(**dict(zip(names.split(), values, strict=True)), extra_descriptors=[], **further)
 
 
 class SimulatedBus(_Backend):
-    """What `usb.core.find(backend=...)` takes. One handle at a time may hold a converter."""
+    """A backend for `usb.core.find(backend=...)`. Only one handle at a time may claim a converter."""
 
     def __init__(self, boxes: Sequence[LabJackU6Box]) -> None:
         self._boxes = tuple(boxes)
-        self._claims: dict[int, object] = {}  # by the box's place: the handle that claimed it
+        self._claims: dict[int, object] = {}  # by position of the box: the handle that claimed it
 
     def claims(self) -> int:
-        """Return how many converters somebody holds."""
+        """Return the number of claimed converters."""
         return len(self._claims)
 
     def enumerate_devices(self) -> Iterator[int]:
@@ -270,19 +270,19 @@ class SimulatedBus(_Backend):
         return SimpleNamespace(place=dev)
 
     def close_device(self, dev_handle: SimpleNamespace) -> None:
-        """Give a handle back, and what it holds."""
+        """Release a handle and its claim."""
         if self._claims.get(dev_handle.place) is dev_handle:
             del self._claims[dev_handle.place]
 
     def set_configuration(self, dev_handle: SimpleNamespace, config_value: int) -> None:
-        """Take the only configuration."""
+        """Accept the only configuration."""
 
     def get_configuration(self, dev_handle: SimpleNamespace) -> int:
         self._box(dev_handle)
         return 1
 
     def claim_interface(self, dev_handle: SimpleNamespace, intf: int) -> None:
-        """Hold the device. Raises USBError when another handle does."""
+        """Claim the device. Raises USBError when another handle has it."""
         self._box(dev_handle)
         if self._claims.setdefault(dev_handle.place, dev_handle) is not dev_handle:
             raise _core.USBError("Resource busy", -6, errno.EBUSY)
@@ -295,7 +295,7 @@ class SimulatedBus(_Backend):
         return len(data)
 
     def bulk_read(self, dev_handle: SimpleNamespace, ep: int, intf: int, buff: Any, timeout: int) -> int:  # noqa: ANN401
-        """Fill `buff` with an answer or a stream packet. Raises USBTimeoutError when there is none in `timeout` ms."""
+        """Fill `buff` with an answer or a stream packet. Raises USBTimeoutError without one in `timeout` ms."""
         box = self._box(dev_handle)
         data = box.answer() if ep == _ENDPOINTS[1] else box.stream_packet(timeout * 1e-3)
         if data is None:
@@ -308,7 +308,7 @@ class SimulatedBus(_Backend):
         return False
 
     def _box(self, dev_handle: SimpleNamespace) -> LabJackU6Box:
-        """Return the box of a handle. Raises USBError when it was pulled out."""
+        """Return the box of a handle. Raises USBError when it was unplugged."""
         box = cast("LabJackU6Box", self._boxes[dev_handle.place])
         if not box.is_plugged:
             self.close_device(dev_handle)

@@ -1,6 +1,6 @@
-"""What is inside the simulated networked box: its memory, its web pages, its counter, its readings, its replies.
+"""The inside of the simulated networked box: settings, web pages, counter, readings and replies.
 
-Layouts from the maker's manual 9620-05-NET FT (chapters 9 to 11), packed here and nowhere else.
+Layouts are from the maker's manual 9620-05-NET FT (chapters 9 to 11), packed here only.
 """
 
 import struct
@@ -41,12 +41,12 @@ _SETTABLE = {  # page: variables it accepts
 
 @dataclass(frozen=True, slots=True)
 class Product:
-    """Which box is simulated."""
+    """The type of the simulated box."""
 
     name: str
-    ticks: float  # of its own sampling in a second
+    ticks: float  # samples per second of the box itself
     saturated: int  # status of a reading out of range
-    converter: str  # what its pages say of its converter's rate; nothing where they do not
+    converter: str  # rate of the converter on its pages; "" where they have none
 
 
 NET_FT = Product("SIMULATED Net F/T", 7000.0, 1 << 31 | 1 << 17, "")
@@ -54,7 +54,7 @@ AXIA = Product("SIMULATED Ethernet Axia80", 7812.5, 1 << 31 | 1 << 30, "7812")
 
 
 class Pages:
-    """The box's settings, kept over a reboot as the real one keeps them."""
+    """The box's settings, which survive a reboot as in the real box."""
 
     def __init__(self, serial: str, rated: Array, rate: int, product: Product) -> None:
         self.product = product
@@ -62,7 +62,7 @@ class Pages:
         self._rated = rated  # (6,) [N, N mm]
         self._values = {"setuserfilter": "0", "setpke": "0", "cfgnam": "Nano43 SI-36-0.5", "cfgid": "default"}
         self._bias = [0] * 6
-        self.count_factor = 1.0  # times as many counts to a unit as usual
+        self.count_factor = 1.0  # factor of the counts per unit
         self.force_code = 2
         self.torque_code = 3
         self.buffered = 10  # records in a datagram of buffered streaming
@@ -72,12 +72,12 @@ class Pages:
 
     @property
     def counts_per_wrench(self) -> Array:
-        """Counts in one N or N mm of each axis, shape (6,), by the units; `counting` is beyond it."""
+        """Counts in one N or N mm of each axis, shape (6,), by the units, without `count_factor`."""
         return _COUNTS / np.repeat([_FORCES[self.force_code][1], _TORQUES[self.torque_code][1]], 3)
 
     @property
     def scales(self) -> list[int]:
-        """What one of the six 16-bit counts of the TCP port stands for, in full counts."""
+        """Full counts in one 16-bit count of the TCP port, for each axis."""
         return [int(np.ceil(rated / 32767)) for rated in self._rated * self.counts_per_wrench]
 
     @property
@@ -86,7 +86,7 @@ class Pages:
         return max(round(_COUNTS * self.count_factor), 1)
 
     def answer(self, target: str, status: int, counts: list[int]) -> tuple[int, str]:
-        """Return (HTTP status, page) for a GET of `target`, with the box's status and counts of this instant."""
+        """Return (HTTP status, page) for a GET of `target`, with the box's present status and counts."""
         url = urlsplit(target)
         query = dict(parse_qsl(url.query))
         if url.path == "/netftapi2.xml":
@@ -139,7 +139,7 @@ class Pages:
         return _page("netft", elements)
 
     def _set(self, name: str, text: str) -> None:
-        """Take one value, or leave all as it is where the value makes no sense, as the box does."""
+        """Set one value; an invalid one is ignored, as in the real box."""
         if name in ("cfgid", "cfgnam"):
             self._values[name] = text
             return
@@ -164,7 +164,7 @@ class Pages:
             self._values[name] = text
 
     def _set_rate(self, rate: int) -> None:
-        """Send every so-many-th tick, at `rate` readings a second or the next higher rate that divides the ticks."""
+        """Set the step in ticks, for `rate` readings a second or the next higher rate that divides the ticks."""
         self.step = int(self.product.ticks // rate)
 
 
@@ -181,24 +181,24 @@ _REASONS = {200: "OK", 302: "Found", 404: "Not Found"}
 
 
 class Electronics:
-    """The box without its ports. Times are the bench's [s]; a reading after its number is 32 bytes."""
+    """The box without its ports. Times are the bench's [s]; a reading without its number has 32 bytes."""
 
     def __init__(
         self, bench: Bench, faults: Faults, *, rate: int, first_tick: int, rate_error: float = 0.0, product: Product
     ) -> None:
-        """Switch on at time 0 with the counter at `first_tick`, running wrong by `rate_error` [-]."""
+        """Switch on at time 0 with the counter at `first_tick`, with the rate error `rate_error` [-]."""
         self._bench = bench
         self._faults = faults
         self._rated = np.array(bench.settings.rated)
         self.pages = Pages(bench.serial, self._rated, rate, product)
         self._ticks_a_second = product.ticks * (1.0 + rate_error)
         self._bias = np.zeros(6)  # software bias [N, N mm]
-        self._power_up = 0.0  # when the counter stood at _first_tick [s]
+        self._power_up = 0.0  # when the counter was `_first_tick` [s]
         self._first_tick = first_tick
-        self._last = bytes(32)  # the last reading streamed: a stalled converter gives it again
+        self._last = bytes(32)  # the last reading streamed, repeated by a stalled converter
 
     def reboot(self, now: float) -> None:
-        """Forget what is not kept over power-off."""
+        """Reset everything that is lost at power-off."""
         self._power_up, self._first_tick = now, 0
         self._bias = np.zeros(6)
 
@@ -207,11 +207,11 @@ class Electronics:
         return self._first_tick + int((self._age(time) - self._age(self._power_up)) * self._ticks_a_second)
 
     def time(self, tick: int) -> float:
-        """Return when the counter reaches `tick`."""
+        """Return the time at which the counter reaches `tick`."""
         return float(self.times([tick])[0])
 
     def times(self, ticks: list[int]) -> Array:
-        """Return when the counter reaches each of `ticks`."""
+        """Return the times at which the counter reaches `ticks`."""
         ages = self._age(self._power_up) + (np.array(ticks) - self._first_tick) / self._ticks_a_second
         return self._faults.instants(ages)
 
@@ -219,7 +219,7 @@ class Electronics:
         return float(self._faults.device_time(np.array([time]))[0])
 
     def readings(self, ticks: list[int]) -> list[bytes]:
-        """Return counter, status and six counts, packed, at each of `ticks`."""
+        """Return the packed counter, status and six counts at each of `ticks`."""
         if not ticks:
             return []
         times = self.times(ticks)
@@ -232,11 +232,11 @@ class Electronics:
         return records
 
     def set_bias(self, now: float) -> None:
-        """Let the present load read as zero."""
+        """Set the present load as zero."""
         self._bias = np.clip(self._bench.wrench(np.array([now]))[0], -self._rated, self._rated)
 
     def tcp_reply(self, request: bytes, now: float) -> bytes:
-        """Return the reply to the 20 bytes of a TCP request; none to a command that is not simulated."""
+        """Return the reply to the 20 bytes of a TCP request; b"" for a command that is not simulated."""
         self.pages.count_factor = self._faults.count_factor(now)
         if request[0] == 0:  # READFT: counts in 16 bits, and system commands in the last two bytes
             if request[19] & 1:
@@ -266,7 +266,7 @@ class Electronics:
         """Return the status (n) and the six counts (n, 6) at `times` (n,)."""
         wrench = self._faults.sensed_wrench(self._bench, times)
         saturation = self._faults.during("saturate", times)
-        wrench[saturation] = self._rated  # what a clipped converter shows
+        wrench[saturation] = self._rated  # the output of a clipped converter
         overloaded = saturation | np.any(np.abs(wrench) > self._rated, axis=1)
         counts = (np.clip(wrench, -self._rated, self._rated) - self._bias) * self.pages.counts_per_wrench
         counts *= np.array([self._faults.count_factor(time) for time in times.tolist()])[:, None]

@@ -1,6 +1,6 @@
-"""As much of NI's library as a driver uses, with a simulated bench on the device's inputs. No hardware, no NI driver.
+"""The part of NI's library that a driver uses, with a simulated bench on the device's inputs, without NI's driver.
 
-Names and behaviour are those of the public package nidaqmx; the device's clock is wrong by half a thousandth.
+Names and behaviour follow the public package nidaqmx; the device's clock is wrong by 0.05 %.
 """
 
 import sys
@@ -15,18 +15,18 @@ from simulators.bench import FT32831, Bench, calibration_file
 from simulators.faults import Faults
 from simulators.simulator import RunningSimulator, Simulator, stopwatch, unplug
 
-ACTUAL = 1.0005  # rate of the device's clock over the one asked for [-]
+ACTUAL = 1.0005  # rate of the device's clock over the requested one [-]
 OVERFLOW = "The application is not able to keep up with the hardware acquisition.\n\nTask Name: _unnamedTask<0>"
 _ABSENT = "Device identifier is invalid, or the device was removed.\n\nTask Name: _unnamedTask<0>"
 _MODULES = ("nidaqmx", "nidaqmx.constants", "nidaqmx.system")
 
 
 class DaqError(Exception):
-    """What NI's library raises."""
+    """The exception of NI's library."""
 
 
 class SimulatedNidaqmx(ModuleType):
-    """The library on a computer with one simulated device, Dev1. Its time, and the bench's, begins when it is made."""
+    """The library with one simulated device, Dev1. Its time and the bench's begin at its creation."""
 
     DaqError = DaqError
 
@@ -42,16 +42,16 @@ class SimulatedNidaqmx(ModuleType):
         self.system = SimpleNamespace(System=SimpleNamespace(local=lambda: local))
         self.bench = bench
         self.faults = faults or Faults()
-        self.gauges = np.linalg.inv(FT32831)  # V for one N or N mm
+        self.gauges = np.linalg.inv(FT32831)  # V per N or N mm
         self.open_tasks = 0
-        self.starts: list[float] = []  # when acquisitions began [s]
-        self.range = (-10.0, 10.0)  # that the device takes, whatever is asked [V]
+        self.starts: list[float] = []  # start times of acquisitions [s]
+        self.range = (-10.0, 10.0)  # of the device, independent of the request [V]
         self.requests: list[tuple[Any, ...]] = []  # channels, terminals and limits
-        self.now = stopwatch(clock)  # the device's and the bench's time [s]
+        self.now = stopwatch(clock)  # time of the device and the bench [s]
         self._previous_modules: dict[str, ModuleType | None] = {}
 
     def install(self) -> None:
-        """Let it be what `import nidaqmx` gives."""
+        """Install it as the module `nidaqmx`."""
         modules = {name: self if "." not in name else ModuleType(name) for name in _MODULES}
         self._previous_modules = {name: sys.modules.get(name) for name in _MODULES}
         sys.modules.update(modules)

@@ -1,7 +1,7 @@
 """The stand-alone force/torque controller on a pseudo-terminal.
 
-Behaviour and bytes after the command list of its manual (9620-05-CTL) as published drivers give it, packed here and
-nowhere else. The wording of the banner and of refusals, and the error digit of a saturated transducer (1), are ours.
+Behaviour and bytes follow the command list of its manual (9620-05-CTL) as given by published drivers, and are packed
+here only. The wording of banner and refusals, and the error digit of a saturated transducer (1), are assumed.
 """
 
 import struct
@@ -18,17 +18,17 @@ COUNTS_PER_N = 800.0
 COUNTS_PER_NM = 60_000.0
 BANNER = b"\r\nSIMULATED F/T Controller\r\nsimulated transducer %s\r\nready\r\n"
 
-_NAP = 0.01  # longest wait, and so for an end [real s]
+_NAP = 0.01  # longest wait, and so the longest delay of an end [real s]
 _SHORTEST_NAP = 0.0005
-_BURST = 400  # records at one go after the computer was busy
+_BURST = 400  # most records in one send after the computer was busy
 _START_UP = 0.2  # from power to prompt [s]
 _COMMANDS = (b"SA", b"CV", b"CL", b"CR", b"CP", b"SM", b"SP", b"SR", b"CF", b"SF", b"CS", b"CE", b"RS", b"RL", b"%")
 
 
 class SerialFtBox(LineBox):
-    """A controller with a simulated bench behind it. Its time, and the bench's, begins when it is started.
+    """A controller with a simulated bench behind it. Its time and the bench's begin when it is started.
 
-    Bytes leave the pseudo-terminal no faster than the line's speed, and as garbage where the reader set another.
+    Bytes are sent no faster than the line's speed, and as garbage where the reader uses another speed.
     """
 
     def __init__(self, bench: Bench, clock: Clock, *, baud: int = 38400, faults: Faults | None = None) -> None:
@@ -37,12 +37,12 @@ class SerialFtBox(LineBox):
         self._bench = bench
         self._baud = baud
         self._rated = np.array(bench.settings.rated)
-        self._counts = np.repeat([COUNTS_PER_N, COUNTS_PER_NM / 1000.0], 3)  # in one N or N mm
+        self._counts = np.repeat([COUNTS_PER_N, COUNTS_PER_NM / 1000.0], 3)  # per N or N mm
         self.power_up(0.0)
 
     @property
     def uri(self) -> str:
-        """The address to open it at; known once it is started."""
+        """Its address, known once it is started."""
         force, torque = self._rated[0], self._rated[3] / 1000.0
         return (
             f"serial-ft://{self.path}?baud={self._baud}&counts_per_N={COUNTS_PER_N:g}"
@@ -55,13 +55,13 @@ class SerialFtBox(LineBox):
         self._binary = False
         self._biases: list[Array] = []
         self._line = bytearray()
-        self._streaming_since: float | None = None  # when the stream's first record leaves [s]
+        self._streaming_since: float | None = None  # departure of the stream's first record [s]
         self._sent = 0  # records of this stream
         self._last = (0, [0] * 6)
-        self._ready_at: float | None = now + _START_UP  # when the banner comes, after power-up
+        self._ready_at: float | None = now + _START_UP  # time of the banner, after power-up
 
     def work(self, port: PseudoTerminal, now: float) -> None:
-        """Send the banner and records that are due, and answer bytes as they come."""
+        """Send the banner and records that are due, and answer received bytes."""
         if self._ready_at is not None and now >= self._ready_at:
             self._ready_at = None
             self._send(port, BANNER % self._bench.serial.encode() + b">")
@@ -71,16 +71,16 @@ class SerialFtBox(LineBox):
                 self._on_byte(port, byte if port.baud == self._baud else byte ^ 0x55)
 
     def _send(self, port: PseudoTerminal, data: bytes) -> None:
-        """Send `data`, garbled where the reader listens at another speed."""
+        """Send `data`, garbled where the reader uses another speed."""
         port.send(data if port.baud == self._baud else bytes(byte ^ 0xA5 for byte in data))
 
     @property
     def _period(self) -> float:
-        """Time a record takes on the line: ten bits a byte [s]."""
+        """Duration of a record on the line, with ten bits for each byte [s]."""
         return (13 if self._binary else 45) * 10 / self._baud
 
     def _until_due(self) -> float:
-        """Return how long nothing has to be sent [real s]."""
+        """Return the time until the next record is due, within the limits of a wait [real s]."""
         if self._streaming_since is None:
             return _NAP
         since = self.faults.device_time(np.array([self._streaming_since]))
@@ -88,7 +88,7 @@ class SerialFtBox(LineBox):
         return min(max((due - self.now()) / self.clock.factor, _SHORTEST_NAP), _NAP)
 
     def _send_due(self, port: PseudoTerminal, now: float) -> None:
-        """Send the records whose last byte would be through by now, and whatever was delayed until now."""
+        """Send the records whose last byte is due, and delayed ones."""
         if self._streaming_since is None:
             return
         times, self._sent = self.faults.due(self._streaming_since, now, 1.0 / self._period, self._sent, _BURST)
@@ -112,7 +112,7 @@ class SerialFtBox(LineBox):
             self._line.append(byte)
 
     def _answer(self, command: bytes) -> bytes:
-        """Carry out one command and return what follows its echo."""
+        """Carry out one command and return the bytes after its echo."""
         name, _, argument = command.partition(b" ")
         if command == b"QS":
             self._streaming_since, self._sent = self.now(), 0
@@ -139,7 +139,7 @@ class SerialFtBox(LineBox):
         return self._records(np.array([self.now()]))[0]
 
     def _records(self, times: Array) -> list[bytes]:
-        """Return a record as bytes for each of `times` (n,) [s]."""
+        """Return the bytes of a record for each of `times` (n,) [s]."""
         if not len(times):
             return []
         wrench = self.faults.sensed_wrench(self._bench, times)

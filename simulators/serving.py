@@ -1,6 +1,6 @@
-"""The other end of every driver: the list of simulated devices, each served to any client, and the timetable of one.
+"""The list of simulated devices, one for each driver, how one is served, and its timetable.
 
-The list reads itself from the modules of this package. A test that is run on every driver takes it from here.
+The list is read from the modules of this package. Tests of all drivers use it.
 """
 
 import itertools
@@ -22,18 +22,18 @@ from simulators.simulator import RunningSimulator, Simulator
 from simulators.stroke import CONTACT_AREA, Surface, paper_surfaces
 from simulators.subject import SimulatedSubject
 
-APART = 5.0  # least time from one stroke's beginning to the next; none lasts longer [s]
+APART = 5.0  # least time between the starts of strokes; no stroke lasts longer [s]
 
 _Positive = Annotated[float, msgspec.Meta(gt=0.0, le=1e6)]
 
 
 class TimetableError(ValueError):
-    """A timetable file says something that cannot be carried out."""
+    """A timetable file that cannot be carried out."""
 
 
 @dataclass(frozen=True, slots=True)
 class Timetable:
-    """Strokes, in order of time, and faults; restarted every `repeat` seconds where that is above 0."""
+    """Strokes, in order of time, and faults; restarted every `repeat` seconds if above 0."""
 
     strokes: tuple[tuple[float, Surface], ...]  # beginning [s] and surface of each
     faults: tuple[Fault, ...] = ()
@@ -51,17 +51,17 @@ class Timetable:
 
 
 class ScriptedBench(Bench):
-    """A bench that is stroked by one subject as a timetable says."""
+    """A bench stroked by one subject according to a timetable."""
 
     def __init__(self, seed: int, timetable: Timetable, settings: BenchSettings | None = None) -> None:
-        """Begin the timetable at the bench's time 0. The seed is that of the noise and of the subject."""
+        """Begin the timetable at the bench's time 0. The seed sets the noise and the subject."""
         super().__init__(seed, settings)
         self._timetable = timetable
         self._subject = SimulatedSubject(seed)
         self._stroke_count = 0  # so far
 
     def wrench(self, times: Array) -> Array:
-        """Return what the transducer feels (n, 6) at `times` (n,) [s], after beginning the strokes due by then."""
+        """Return the measured wrench (n, 6) at `times` (n,) [s], after beginning the strokes due by then."""
         strokes = self._timetable.strokes
         while len(times) and strokes:
             cycle, position = divmod(self._stroke_count, len(strokes))
@@ -70,7 +70,7 @@ class ScriptedBench(Bench):
             if time > times[-1] or (cycle > 0 and self._timetable.repeat == 0.0):
                 break
             self._stroke_count += 1
-            if time + APART < times[0]:  # nobody asked in its time
+            if time + APART < times[0]:  # its time has passed without a reading
                 continue
             self.mount(surface)
             self.begin_stroke(self._subject.stroke(surface, repetition=cycle + 1), time)
@@ -78,7 +78,7 @@ class ScriptedBench(Bench):
 
 
 def usual_timetable() -> Timetable:
-    """Return what a box does without a script: the paper's ten surfaces, one every six seconds, again and again."""
+    """Return the default timetable: the paper's ten surfaces, one every six seconds, repeatedly."""
     surfaces = paper_surfaces().values()
     return Timetable(tuple((6.0 * i, surface) for i, surface in enumerate(surfaces)), repeat=6.0 * len(surfaces))
 
@@ -135,9 +135,9 @@ WIRES = tuple(name for name, simulator in SIMULATORS.items() if simulator.on_por
 def serve(
     name: str, *, seed: int = 0, factor: float = 1.0, timetable: Timetable | None = None, **settings: object
 ) -> RunningSimulator:
-    """Return a device of WIRES that serves this computer until it is closed, stroked as a timetable says.
+    """Return a device of `WIRES` served on this computer until it is closed, stroked according to a timetable.
 
-    `settings` are its own. Time runs `factor` times as fast as real. Raises SetupError when a port cannot be had.
+    `settings` are those of the device. Time runs at `factor` times real time. Raises SetupError when a port is in use.
     """
     timetable = timetable or usual_timetable()
     faults = Faults(timetable.faults, seed=seed, repeat=timetable.repeat)

@@ -1,4 +1,4 @@
-"""A simulated device: how it starts, the thread and serial line it is served on, and what can go wrong on its wire."""
+"""A simulated device: its start, its thread, its serial line, and the faults on its wire."""
 
 import contextlib
 import os
@@ -17,14 +17,14 @@ from drivers.transducer import SetupError
 from simulators.bench import Bench
 from simulators.faults import Fault, Faults, Kind
 
-ROOM = 65536  # bytes kept for a reader that is late, as much as a computer's serial driver keeps
+ROOM = 65536  # buffer for a late reader, as in a computer's serial driver [bytes]
 
 
 class PseudoTerminal:
-    """A pair of ends that can be pulled apart and plugged in again under the same path. Linux and macOS only."""
+    """A pair of ends that can be unplugged and plugged in again under the same path. Linux and macOS only."""
 
     def __init__(self, name: str) -> None:
-        """Make the port, plugged in, at a path that ends with `name`. Raises SetupError where there are none."""
+        """Create the port, plugged in, at a path that ends with `name`. Raises SetupError on other systems."""
         if os.name != "posix":
             raise SetupError("a simulated serial port needs Linux or macOS; use the sim: address on this computer")
         self._folder = Path(tempfile.mkdtemp(prefix="daq-app-"))
@@ -35,12 +35,12 @@ class PseudoTerminal:
 
     @property
     def is_plugged(self) -> bool:
-        """Whether the port is there."""
+        """Whether the port is plugged in."""
         return self._ours >= 0
 
     @property
     def baud(self) -> int:
-        """The rate at which the other side has set its end [bits a second]; 0 where it is none of the usual ones."""
+        """Baud rate of the other end [bits a second]; 0 for an unusual one."""
         import termios  # exists where pseudo-terminals do
 
         code: int = termios.tcgetattr(self._theirs)[5]
@@ -48,22 +48,22 @@ class PseudoTerminal:
         return next((baud for baud in usual if getattr(termios, f"B{baud}", None) == code), 0)
 
     def plug_in(self) -> None:
-        """Let the port be there (again), raw."""
+        """Plug the port in (again), in raw mode."""
         import fcntl  # these exist where pseudo-terminals do
         import termios
         import tty
 
         if self.is_plugged:
             return
-        self._ours, self._theirs = os.openpty()  # theirs stays open too, or the port would hang up between two readers
+        self._ours, self._theirs = os.openpty()  # theirs stays open too, or the port would hang up between readers
         tty.setraw(self._theirs)
-        fcntl.ioctl(self._ours, termios.TIOCPKT, struct.pack("i", 1))  # what is read begins with a byte of control
+        fcntl.ioctl(self._ours, termios.TIOCPKT, struct.pack("i", 1))  # each read begins with a control byte
         os.set_blocking(self._ours, False)
         Path(self.path).unlink(missing_ok=True)
         Path(self.path).symlink_to(os.ttyname(self._theirs))
 
     def unplug(self) -> None:
-        """Let the port vanish under whoever holds it."""
+        """Remove the port while others may have it open."""
         if not self.is_plugged:
             return
         Path(self.path).unlink(missing_ok=True)
@@ -73,20 +73,20 @@ class PseudoTerminal:
         self._buffer.clear()
 
     def receive(self, timeout: float) -> bytes:
-        """Return what the other side has sent, waiting up to `timeout` real seconds for it."""
+        """Return bytes from the other side, waiting up to `timeout` real seconds."""
         self._obey()
         self._flush()
         ready, _, _ = select.select([self._ours], [], [], timeout)
         return self._read() if ready else b""
 
     def send(self, data: bytes) -> None:
-        """Send `data`. What the other side has not read beyond ROOM bytes is lost, as on a line."""
+        """Send `data`. Unread bytes beyond `ROOM` are lost, as on a line."""
         self._obey()
         self._buffer += data[: max(ROOM - len(self._buffer), 0)]
         self._flush()
 
     def _read(self) -> bytes:
-        """Return what was sent; where a reader threw away what had come for it, as on opening, so is what waits."""
+        """Return bytes from the other side; where a reader flushes its input, as on opening, clear the buffer."""
         import termios  # exists where pseudo-terminals do
 
         try:
@@ -100,12 +100,12 @@ class PseudoTerminal:
         return b""
 
     def _obey(self) -> None:
-        """Read a byte of control, where there is one."""
+        """Read a control byte, if there is one."""
         if self.is_plugged and select.select([], [], [self._ours], 0.0)[2]:
             self._read()
 
     def _flush(self) -> None:
-        """Pass on what the system's own few kilobytes have room for."""
+        """Pass on as many bytes as the system's buffer takes."""
         with contextlib.suppress(OSError):
             del self._buffer[: os.write(self._ours, self._buffer)]
 
@@ -122,7 +122,7 @@ def stopwatch(clock: Clock) -> Callable[[], float]:
 
 
 class ServedBox:
-    """One box. Its time, and the bench's, begins when it is started."""
+    """One box. Its time and the bench's begin when it is started."""
 
     now: Callable[[], float]  # [s]; from `serve` on
 
@@ -133,7 +133,7 @@ class ServedBox:
         self._thread: threading.Thread | None = None
 
     def serve(self, work: Callable[[], None], name: str) -> None:
-        """Let time begin, and a thread work until `closing` is set."""
+        """Start the time, and a thread that works until `closing` is set."""
         self.now = stopwatch(self.clock)
         self._thread = threading.Thread(target=work, name=f"simulated {name}", daemon=True)
         self._thread.start()
@@ -146,13 +146,13 @@ class ServedBox:
             self._thread = None
 
 
-_NAP = 0.01  # of a box without its line or its power [real s]
+_NAP = 0.01  # of a box without line or power [real s]
 
 
 class LineBox(ServedBox):
     """One box on a line."""
 
-    is_on: bool  # by `power_up`; False: without power
+    is_on: bool  # set by `power_up`; False: without power
 
     def __init__(self, name: str, clock: Clock, faults: Faults | None) -> None:
         """Set up a box whose port's path ends with `name`."""
@@ -167,7 +167,7 @@ class LineBox(ServedBox):
         return self._port.path
 
     def start(self) -> None:
-        """Make the port and begin to serve. Raises SetupError where there are no pseudo-terminals."""
+        """Create the port and begin to serve. Raises SetupError without pseudo-terminals."""
         port = self._port = PseudoTerminal(self._name)
         self.serve(lambda: self._serve(port), self._name)
 
@@ -177,7 +177,7 @@ class LineBox(ServedBox):
             self._port.close()
 
     def _serve(self, port: PseudoTerminal) -> None:
-        """Be the box until closed: unplugged, without power, powered up again, or at work."""
+        """Run the box until closed: unplugged, without power, powered up again, or at work."""
         while not self.closing.is_set():
             now = self.now()
             if self.faults.active("unplug", now):
@@ -194,11 +194,11 @@ class LineBox(ServedBox):
             self.work(port, now)
 
     def power_up(self, now: float) -> None:
-        """Forget what is not kept over power-off; the box is on."""
+        """Reset everything that is lost at power-off; the box is then on."""
         raise NotImplementedError
 
     def work(self, port: PseudoTerminal, now: float) -> None:
-        """Send what is due, then listen for a short while and answer."""
+        """Send due bytes, then listen briefly and answer."""
         raise NotImplementedError
 
 
@@ -207,32 +207,32 @@ LINE_FAULTS: tuple[Kind, ...] = ("lose", "corrupt", "shorten", "saturate", "unpl
 
 @dataclass(frozen=True, slots=True)
 class RunningSimulator:
-    """A simulated device that runs, and how to reach and to stop it."""
+    """A running simulated device, with its address and its stop."""
 
     uri: str  # the address that opens it
-    bench: Bench  # what it feels
-    now: Callable[[], float]  # its time and the bench's [s]
-    close: Callable[[], None]  # takes it away
-    open_handles: Callable[[], int] = lambda: 0  # that somebody has on it, where there are some beyond open files
-    forget: Callable[[], None] = lambda: None  # lets the computer have its own USB and libraries again
+    bench: Bench  # the simulated bench
+    now: Callable[[], float]  # time of the device and the bench [s]
+    close: Callable[[], None]  # removes it
+    open_handles: Callable[[], int] = lambda: 0  # on it, other than open files
+    forget: Callable[[], None] = lambda: None  # restores the computer's own USB and libraries
 
 
-Start = Callable[..., RunningSimulator]  # takes bench, clock, faults, a folder for what it writes, and own settings
+Start = Callable[..., RunningSimulator]  # takes bench, clock, faults, a folder for its files, and its settings
 
 
 @dataclass(frozen=True, slots=True)
 class Simulator:
-    """How a simulated device is started, and what can go wrong on its wire."""
+    """Start of a simulated device, and possible faults on its wire."""
 
     name: str  # of the driver that reads it
     start: Start
-    factor: float  # times as fast as real it can run on a computer that has much else to do
-    tells: tuple[Kind, ...] = LINE_FAULTS  # faults that can happen on this wire and that a driver can notice
-    hides: tuple[Kind, ...] = ("stall",)  # faults that can happen and that no driver can tell
-    statuses: tuple[int, ...] = ()  # that its maker's manual lists, to be set one after the other
-    unshown: float = 0.0  # share of damaged records that no check on this wire shows
+    factor: float  # time relative to real time that it sustains on a busy computer
+    tells: tuple[Kind, ...] = LINE_FAULTS  # possible faults on this wire that a driver can detect
+    hides: tuple[Kind, ...] = ("stall",)  # possible faults that no driver can detect
+    statuses: tuple[int, ...] = ()  # listed in the maker's manual, to be set in turn
+    unshown: float = 0.0  # share of damaged records that no check on this wire detects
     on_ports: bool = True  # of this computer, so that any program can open it (`daq-app simulate`)
-    at_start: bool = False  # a status is sent in full only where it is set when a stream begins
+    at_start: bool = False  # a status is sent in full only if set when a stream begins
 
 
 class _Box(Protocol):
@@ -247,7 +247,7 @@ class _Box(Protocol):
 
 
 def serve_on_ports(make: Callable[..., _Box]) -> Start:
-    """Return the function that starts a box with ports of its own; `make` takes bench, clock, `faults` and settings."""
+    """Return the start function of a box with its own ports; `make` takes bench, clock, `faults` and settings."""
 
     def start(bench: Bench, clock: Clock, faults: Faults, _: Path, **settings: object) -> RunningSimulator:
         box = make(bench, clock, faults=faults, **settings)
@@ -258,5 +258,5 @@ def serve_on_ports(make: Callable[..., _Box]) -> Start:
 
 
 def unplug(faults: Faults) -> Callable[[], None]:
-    """Return what takes a device away that serves on no port: its plug is pulled for good."""
+    """Return the stop function of a device without ports, which unplugs it for good."""
     return lambda: faults.put(Fault("unplug", 0.0, 1e9))

@@ -1,4 +1,4 @@
-"""Stimuli of known friction, the ten that the paper reports, and the course of a simulated stroke over one."""
+"""Stimuli of known friction, the ten of the paper, and the course of a simulated stroke over one."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,20 +8,20 @@ import numpy as np
 
 from drivers.arrays import Array
 
-CONTACT_AREA = 100.0  # [mm2] 1 cm², over which the paper spreads the greatest tangential force
+CONTACT_AREA = 100.0  # [mm2] 1 cm², by which the paper divides the greatest tangential force
 
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """A flat stimulus: how a finger rubs on it, and how the paper's subject stroked it."""
+    """A flat stimulus: its friction, and the stroke of the paper's subject over it."""
 
-    mu: float  # coefficient of friction, the same at every force and speed [-]
+    mu: float  # coefficient of friction, independent of force and speed [-]
     descriptor: str = "stickiness"
     index: int = 50  # its maker's number on the descriptor, 0 to 100
     tau_max: float = 0.02  # greatest tangential force of the stroke over CONTACT_AREA [MPa]
     speed: float = 20.0  # speed of the stroke [mm/s]
     direction: int = 1  # of the stroke: +1 proximal to distal, -1 distal to proximal
-    holds: bool = True  # blocks the finger first, so that T/N climbs to mu before anything slides
+    holds: bool = True  # the surface blocks the finger first, so T/N climbs to mu before the slide
 
     def __post_init__(self) -> None:
         if not (self.mu > 0.0 and self.tau_max > 0.0 and self.speed > 0.0):
@@ -41,8 +41,8 @@ class Surface:
         return self.tau_max * CONTACT_AREA / self.mu
 
 
-# Tables 1 and 2 of the paper. tau_max there is headed 1e-4 MPa; with the stated 1 cm² the exponent can only belong to
-# pascals (0.8 N and not 0.008 N of tangential force), so the numbers here are the printed ones times 1e4 Pa.
+# Tables 1 and 2 of the paper. tau_max is headed 1e-4 MPa there; with the stated 1 cm² the exponent must belong to
+# pascals (0.8 N, not 0.008 N, of tangential force), so the numbers here are the printed ones times 1e4 Pa.
 _TABLE_1 = {  # index: mu [-], tau_max [MPa], speed [mm/s]
     0: (0.28, 0.008033, 20.0),
     20: (0.44, 0.015478, 22.0),
@@ -63,7 +63,7 @@ def paper_surfaces() -> Mapping[tuple[str, int], Surface]:
     """Return the ten surfaces of the paper's Tables 1 and 2 by (descriptor, index).
 
     Stickiness is judged proximal to distal, where the surface blocks the finger first; slipperiness distal to
-    proximal, where the finger slides at once (the paper's section 3).
+    proximal, where the finger slides immediately (the paper's section 3).
     """
     surfaces = {
         (descriptor, index): Surface(mu, descriptor, index, tau_max, speed, direction, holds=direction == 1)
@@ -76,27 +76,27 @@ def paper_surfaces() -> Mapping[tuple[str, int], Surface]:
 PRESS = 0.10  # from touch to full normal force [s]
 RELEASE = 0.12  # from full normal force to lift [s]
 SPEED_UP = 0.15  # from rest to full speed [s]
-ROLL = 0.3  # how far the centre of pressure rolls while the skin sticks [mm]
+ROLL = 0.3  # movement of the centre of pressure by rolling while the skin sticks [mm]
 
 
 @dataclass(frozen=True, slots=True)
 class Stroke:
-    """What a hand does in one stroke. Times count from the stroke's beginning, when nothing touches yet."""
+    """Motion and force of one stroke. Times count from its beginning, before contact."""
 
     peak_normal_force: float  # reached once, in the slide [N]
     speed: float  # mean over the steady slide [mm/s]
     direction: int = 1  # +1 proximal to distal, -1 distal to proximal
     approach: float = 0.7  # before the touch: the unloaded stretch [s]
-    stick: float = 0.5  # from touch to slide where the surface holds the finger; where it does not, 0 is used [s]
+    stick: float = 0.5  # from touch to slide where the surface holds the finger; otherwise 0 is used [s]
     slide: float = 2.0  # from the first slip to the lift [s]
-    peak_at: float = 0.55  # when the normal force peaks, as a share of the slide [-]
-    peak_width: float = 0.25  # how long it stays near its peak [s]
-    sag: float = 0.35  # how far the normal force lies below its peak, on average, away from it [-]
-    wander: float = 0.12  # how far it wanders about that level [-]
-    speed_wander: float = 0.05  # how far the speed wanders about its mean [-]
+    peak_at: float = 0.55  # instant of the normal force's peak, as a share of the slide [-]
+    peak_width: float = 0.25  # duration of the peak [s]
+    sag: float = 0.35  # mean drop of the normal force below its peak, away from it [-]
+    wander: float = 0.12  # amplitude of its wandering about that level [-]
+    speed_wander: float = 0.05  # amplitude of the speed's wandering about its mean [-]
     phases: tuple[float, ...] = (0.3, 2.1, 4.4)  # three, of the wandering [rad]
-    slant: float = 0.0  # angle of the path to the x axis [degrees]
-    across: float = 0.0  # where the path crosses x = 0 [mm]
+    slant: float = 0.0  # angle of the path with the x axis [degrees]
+    across: float = 0.0  # y of the path at x = 0 [mm]
 
     def __post_init__(self) -> None:
         if self.peak_normal_force <= 0.0 or self.speed <= 0.0 or self.approach < 0.0 or self.stick < 0.0:
@@ -143,7 +143,7 @@ class Course:
         return self.slip + max(SPEED_UP, 0.0 if self.holds else PRESS), self.lift - RELEASE
 
     def normal_force(self, time: Array) -> Array:
-        """Return N (n,) [N] at `time` (n,) [s]: minimum-jerk press and release, and a level that peaks once."""
+        """Return N (n,) [N] at `time` (n,) [s]: minimum-jerk press and release, and a level with one peak."""
         stroke = self.stroke
         first, second, _ = stroke.phases
         since = time - self.touch
@@ -160,9 +160,9 @@ class Course:
         return self.mu * np.clip((time - self.touch) / self.stroke.stick, 0.0, 1.0)
 
     def position(self, time: Array) -> Array:
-        """Return the centre of pressure along the path (n,) [mm], positive in the stroke's own direction.
+        """Return the centre of pressure along the path (n,) [mm], positive in the stroke's direction.
 
-        While the skin sticks it only rolls; then speed rises as minimum jerk does and wanders about its mean.
+        While the skin sticks the finger only rolls; then speed rises with minimum jerk and wanders about its mean.
         """
         stroke = self.stroke
         sliding = np.maximum(time - self.slip, 0.0)
@@ -174,7 +174,7 @@ class Course:
 
 
 def minimum_jerk(phase: Array) -> Array:
-    """Return 0 before phase 0, 1 after phase 1, and between them the smoothest way (Flash and Hogan, 1985, eq. 4).
+    """Return 0 before phase 0, 1 after phase 1, and a minimum-jerk rise between (Flash and Hogan, 1985, eq. 4).
 
     >>> minimum_jerk(np.array([-1.0, 0.0, 0.5, 1.0, 2.0]))
     array([0. , 0. , 0.5, 1. , 1. ])

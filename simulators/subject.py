@@ -1,4 +1,4 @@
-"""A simulated subject: a hand that strokes a surface and a judge who scores it, from a seed. It knows no solver."""
+"""A simulated subject: a hand that strokes a surface and a judge who scores it, from a seed, without the solver."""
 
 from dataclasses import dataclass, replace
 
@@ -11,24 +11,24 @@ SLIPPERIEST, STICKIEST = 0.24, 0.67  # coefficients of friction, the paper's ext
 
 @dataclass(frozen=True, slots=True)
 class SubjectSettings:
-    """How subjects differ from one another and from themselves. Scores are on the 0 to 100 line."""
+    """Variation between and within subjects. Scores are on the 0 to 100 line."""
 
-    gain: float = 0.94  # how far they spread their scores on average: few use the whole line [-]
-    gain_spread: float = 0.06  # standard deviation between subjects of that [-]
-    offset_spread: float = 3.0  # and of where they put the middle
+    gain: float = 0.94  # mean gain of scores: few subjects use the whole line [-]
+    gain_spread: float = 0.06  # standard deviation of the gain between subjects [-]
+    offset_spread: float = 3.0  # standard deviation of the middle score between subjects
     judgement_noise: float = 4.0  # standard deviation between judgements of the same surface
     friction_weight: float = 0.0  # share of a judgement that follows friction instead of the maker's index [-]
     drift: float = 0.0  # rise of a judgement with each trial of its block
-    carry_over: float = 0.0  # and by this share of how far the index judged before lay above the middle [-]
-    moisture: float = 0.0  # standard deviation between fingers of the logarithm of their friction [-]
-    # Of two strokes that differ by this in log µ the one of more friction is chosen in Φ(1) = 84 %. A JND of 18 % of µ,
-    # so that comparisons of the paper's surfaces are answered neither by chance nor all alike [-].
+    carry_over: float = 0.0  # share of the preceding index's distance above the middle that is added [-]
+    moisture: float = 0.0  # standard deviation of log friction between fingers [-]
+    # With this difference in log µ the stroke of more friction is chosen in Φ(1) = 84 %. The JND is 18 % of µ, so that
+    # comparisons of the paper's surfaces are neither random nor unanimous [-].
     discrimination: float = 0.25
-    lapse: float = 0.04  # share of choices by friction that are made by chance [-]
+    lapse: float = 0.04  # share of random choices by friction [-]
 
 
 class SimulatedSubject:
-    """One subject. The same seed strokes and scores in the same way, whatever the order of the surfaces."""
+    """One subject. The same seed gives the same strokes and scores, independent of the order of the surfaces."""
 
     def __init__(self, seed: int, settings: SubjectSettings | None = None) -> None:
         self.seed = seed
@@ -42,11 +42,11 @@ class SimulatedSubject:
         self._moisture = float(np.exp(draw.normal(0.0, self.settings.moisture)))
 
     def perceived_surface(self, surface: Surface) -> Surface:
-        """Return the surface with this subject's friction on it; normal forces stay as they are."""
+        """Return the surface with this subject's friction on it; normal forces are unchanged."""
         return replace(surface, mu=surface.mu * self._moisture, tau_max=surface.tau_max * self._moisture)
 
     def stroke(self, surface: Surface, repetition: int = 1) -> Stroke:
-        """Return how the subject strokes `surface`: force and speed are the surface's own, the course is personal."""
+        """Return how the subject strokes `surface`: force and speed are the surface's, the rest is personal."""
         draw = self._draw(surface, repetition, 3)
         return Stroke(
             peak_normal_force=surface.peak_normal_force,
@@ -54,7 +54,7 @@ class SimulatedSubject:
             direction=surface.direction,
             approach=float(draw.uniform(0.6, 1.0)),
             stick=float(self._stick * draw.uniform(0.9, 1.1)),
-            # A stroke covers some 40 mm; slower ones last longer, none shorter than it takes to feel anything.
+            # A stroke covers about 40 mm; slower ones last longer, with a lower limit for perception.
             slide=float(np.clip(40.0 * self._pace / surface.speed, 1.9, 2.8) * draw.uniform(0.95, 1.05)),
             peak_at=float(draw.uniform(0.4, 0.7)),
             sag=float(draw.uniform(0.28, 0.4)),
@@ -74,7 +74,7 @@ class SimulatedSubject:
         return round(min(max(score, 0.0), 100.0), 1)
 
     def expected_score(self, surface: Surface, position: int = 0, previous_index: int | None = None) -> float:
-        """Return what `score` would be without the noise of a single judgement and without an end of the line."""
+        """Return the score without judgement noise and without the ends of the line."""
         settings = self.settings
         # Friction between the paper's extremes, as a score: stickier is more, slipperier is less.
         friction_score = 100.0 * (surface.mu - SLIPPERIEST) / (STICKIEST - SLIPPERIEST)
@@ -84,14 +84,14 @@ class SimulatedSubject:
         return 50.0 + self._gain * (target - 50.0) + self._offset + settings.drift * position + carry_over
 
     def by_friction(self, descriptor: str) -> float:
-        """Return how many points a score rises with each unit of perceived µ, over subjects of these settings."""
+        """Return the mean slope of scores on perceived µ [points], over subjects with these settings."""
         sense = 1.0 if descriptor == "stickiness" else -1.0
         return sense * self.settings.gain * self.settings.friction_weight * 100.0 / (STICKIEST - SLIPPERIEST)
 
     def more_friction(self, first: Surface, second: Surface, trial: int, take: int = 1) -> bool:
-        """Say whether the first has more friction in the judgement of this subject, independent in every trial.
+        """Say whether the first has more friction in this subject's judgement, independent in every trial.
 
-        A cumulative-normal observer of log µ: right with Φ(difference / discrimination), and by chance in a lapse.
+        A cumulative-normal observer of log µ: right with probability Φ(difference / discrimination), random in lapses.
         """
         draw = np.random.default_rng([self.seed, 6, trial, take])
         if draw.uniform() < self.settings.lapse:
@@ -99,7 +99,7 @@ class SimulatedSubject:
         return bool(np.log(first.mu / second.mu) > draw.normal(0.0, self.settings.discrimination))
 
     def number(self, surface: Surface, repetition: int = 1) -> float:
-        """Return the number on the subject's own scale: judgements in equal ratios, above 0, of any size.
+        """Return the number on the subject's own scale: equal ratios for equal differences of judgement, above 0.
 
         Ten points on the line are a factor of 1.25; the modulus is the subject's own (log-uniform from 1 to 20).
         """
@@ -107,6 +107,6 @@ class SimulatedSubject:
         return float(f"{modulus * 1.25 ** (self.score(surface, repetition) / 10.0):.3g}")
 
     def _draw(self, surface: Surface, repetition: int, purpose: int) -> np.random.Generator:
-        """Return a source of chance of this subject, this surface and this purpose alone."""
+        """Return the random generator of this subject, surface, repetition and purpose."""
         name = int.from_bytes(surface.descriptor.encode(), "big")
         return np.random.default_rng([self.seed, purpose, name, surface.index, repetition])
