@@ -1,4 +1,4 @@
-"""How labels, buttons and panels of the window are made, so that all of them look and are named alike."""
+"""Labels, buttons and panels of the window, with a common look and names for screen readers."""
 
 import re
 from collections.abc import Callable, Iterable
@@ -33,8 +33,8 @@ from daq_app.wording import tr
 
 Margins = int | tuple[int, int, int, int]  # around a layout: left, top, right, bottom [px]
 B = TypeVar("B", bound=QBoxLayout)
-Part = QWidget | QLayout | int | tuple[QWidget | QLayout, int]  # with its stretch; a number alone is empty room
-SHARES = (500, 300)  # of the width, before somebody moved the handle [-]
+Part = QWidget | QLayout | int | tuple[QWidget | QLayout, int]  # with its stretch; a number is an empty stretch
+SHARES = (500, 300)  # of the width, before the handle is moved [-]
 
 
 def label(text: str = "", role: str = "value", *, wrap: bool = False) -> QLabel:
@@ -46,7 +46,7 @@ def label(text: str = "", role: str = "value", *, wrap: bool = False) -> QLabel:
     return text_label
 
 
-# Spaces that no line ends at: between a number and its unit, a symbol and its number, before a dot that parts facts.
+# Spaces without a line break: between number and unit, symbol and number, and before a dot that separates facts.
 _TIES = re.compile(
     r"(?<=\d) (?=(?:[%°]|[mkµM]?(?:N|Pa|Hz|m|s|B)[²³]?)(?!\w))|(?<=N) (?=mm\b)|(?<=[µ±×≤τ]) (?=[\d−–m])"
     r"|(?<=\d) (?=of \d)|(?<=\d of) (?=\d)| (?=·)"
@@ -54,7 +54,7 @@ _TIES = re.compile(
 
 
 def breakable(text: str) -> str:
-    r"""Return a text whose lines may end within a long word, but not within a quantity.
+    r"""Return a text that may wrap within a long word, but not within a quantity.
 
     >>> breakable("µ 0.43, 2 N mm · 10 % of 3 trials, 5 of 10").split(" ")
     ['µ\xa00.43,', '2\xa0N\xa0mm\xa0·', '10\xa0%', 'of', '3', 'trials,', '5\xa0of\xa010']
@@ -63,7 +63,7 @@ def breakable(text: str) -> str:
 
 
 def whole_facts(row: str) -> str:
-    r"""Return a row of facts, two or more spaces apart, each of which stays whole where it takes a second line.
+    r"""Return a row of facts, two or more spaces apart, that wraps only between facts.
 
     >>> whole_facts("✓  3  R29   no answer")
     '✓  3  R29   no\xa0answer'
@@ -81,15 +81,15 @@ class Panel(QFrame):
 
 
 class WrappedLabel(QLabel):
-    """A label of as many lines as its text needs at the width it has, a long path too.
+    """A label with as many lines as its text needs at its width, even for a long path.
 
-    Its surroundings get no height for a width: scrolled, they would be as high as they like, not as there is room.
+    It reports no height for width: in a scroll area its surroundings would get their preferred height.
     """
 
     def __init__(self, role: str, grade: str = "", *, keeps_room: bool = False) -> None:
-        """Show nothing; one that `keeps_room` has at least a line, and never less than it once needed at its width.
+        """Show nothing; with `keeps_room` it has at least a line, and never shrinks at the same width.
 
-        So what stands around words that come and go does not move.
+        So changing text does not move the parts around it.
         """
         super().__init__()
         self._keeps_room, self._least = keeps_room, 1
@@ -116,13 +116,13 @@ class WrappedLabel(QLabel):
             self._fit()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Take the room that bolder words need."""
+        """Adjust the height to a bolder font."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.FontChange:
             self._fit()
 
     def _fit(self) -> None:
-        self.setMinimumHeight(0)  # which Qt would count among what the text needs
+        self.setMinimumHeight(0)  # else Qt would include it in the needed height
         height = max(self.heightForWidth(max(self.width(), 60)), self._least)
         if self._keeps_room:
             self._least = height
@@ -130,7 +130,7 @@ class WrappedLabel(QLabel):
 
 
 def button(text: str, name: str, act: Callable[[], object], role: str = "", *, checkable: bool = False) -> QPushButton:
-    """Return a button that says `name` to screen readers, and with `checkable` stays pressed until the next press."""
+    """Return a button named `name` for screen readers; with `checkable` it stays pressed until the next press."""
     push = QPushButton(text)
     push.setAccessibleName(name)
     if role:
@@ -142,10 +142,10 @@ def button(text: str, name: str, act: Callable[[], object], role: str = "", *, c
 
 
 class _Choice(QComboBox):
-    """A list that the wheel passes over: turned to scroll the page, it would choose another entry unseen.
+    """A drop-down list that ignores the wheel, which would change the selection while scrolling the page.
 
-    On Linux Qt gives what is chosen for the name of such a list. Its own name is that of a label beside it, which
-    nobody sees: screen readers read the label, then what is chosen.
+    On Linux Qt reports the selected entry as the name of such a list. A hidden label next to it has its real name:
+    screen readers read the label, then the selection.
     """
 
     def __init__(self, name: str) -> None:
@@ -159,7 +159,7 @@ class _Choice(QComboBox):
         return super().sizeHint().expandedTo(QSize(0, TARGET))
 
     def changeEvent(self, event: QEvent) -> None:
-        """Move the label to the parent that the list is given."""
+        """Move the label to the new parent of the list."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.ParentChange:
             self._label.setParent(self.parentWidget())
@@ -169,7 +169,7 @@ class _Choice(QComboBox):
 
 
 def choice(name: str, entries: Iterable[str] = ()) -> QComboBox:
-    """Return a list to choose from that says `name` to screen readers, and takes the room it is given."""
+    """Return a drop-down list named `name` for screen readers, which fills its room."""
     box = _Choice(name)
     box.addItems(list(entries))
     box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
@@ -177,7 +177,7 @@ def choice(name: str, entries: Iterable[str] = ()) -> QComboBox:
 
 
 def row_list(name: str) -> QListWidget:
-    """Return a list whose rows take a second line where they are longer than it is wide."""
+    """Return a list whose rows wrap if they are longer than its width."""
     rows = QListWidget()
     rows.setAccessibleName(name)
     rows.setWordWrap(True)
@@ -187,7 +187,7 @@ def row_list(name: str) -> QListWidget:
 
 
 class EntryLine(QLineEdit):
-    """A line that keeps Enter and Esc to itself: Enter there is not the window's primary button."""
+    """An input line that consumes Enter and Esc, so that Enter does not press the primary button."""
 
     def __init__(self, keep: Callable[[], None], leave: Callable[[], None]) -> None:
         super().__init__()
@@ -203,14 +203,14 @@ class EntryLine(QLineEdit):
 
 
 def is_text_field(widget: QWidget | None) -> bool:
-    """Say whether keys pressed on a widget are text that is typed."""
+    """Say whether keys pressed on a widget are typed text."""
     if isinstance(widget, QComboBox):
         return widget.isEditable()
     return isinstance(widget, QLineEdit | QAbstractSpinBox) and not widget.isReadOnly()
 
 
 def fill(layout: B, *parts: Part) -> B:
-    """Return a layout with further parts at its end."""
+    """Append parts to a layout and return it."""
     for item in parts:
         content, stretch = item if isinstance(item, tuple) else (item, 0)
         if isinstance(content, QWidget):
@@ -223,12 +223,12 @@ def fill(layout: B, *parts: Part) -> B:
 
 
 def hbox(*parts: Part, on: QWidget | None = None, margins: Margins = 0, spacing: int | None = None) -> QHBoxLayout:
-    """Return parts beside each other, as the layout of a widget or within another layout."""
+    """Return a row of parts, as the layout of a widget or within another layout."""
     return _arrange(QHBoxLayout(), parts, on, margins, spacing)
 
 
 def vbox(*parts: Part, on: QWidget | None = None, margins: Margins = 0, spacing: int | None = None) -> QVBoxLayout:
-    """Return parts below each other, as `hbox` does beside each other."""
+    """Return a column of parts, as the layout of a widget or within another layout."""
     return _arrange(QVBoxLayout(), parts, on, margins, spacing)
 
 
@@ -242,12 +242,12 @@ def _arrange(layout: B, parts: tuple[Part, ...], on: QWidget | None, margins: Ma
 
 
 def set_horizontal(layout: QBoxLayout, horizontal: bool) -> None:
-    """Put the parts of a layout beside each other, or below each other where there is no room for that."""
+    """Arrange the parts of a layout in a row, or in a column."""
     layout.setDirection(QBoxLayout.Direction.LeftToRight if horizontal else QBoxLayout.Direction.TopToBottom)
 
 
 def stack_pages(*pages: QWidget) -> QStackedWidget:
-    """Return a stack of pages of which one is shown, the first at the beginning."""
+    """Return a stack of pages that shows the first."""
     stack = QStackedWidget()
     for page in pages:
         stack.addWidget(page)
@@ -255,11 +255,11 @@ def stack_pages(*pages: QWidget) -> QStackedWidget:
 
 
 def label_grid(values: Iterable[tuple[str, QWidget]], across: int = 1, role: str = "quiet") -> QGridLayout:
-    """Return a grid of widgets behind their labels, `across` pairs in a row, labels in a role of the style sheet."""
+    """Return a grid of labelled widgets, `across` pairs in a row, labels in a role of the style sheet."""
     grid = QGridLayout()
     grid.setHorizontalSpacing(GRID)
     grid.setVerticalSpacing(2)
-    alignment = Qt.AlignmentFlag.AlignTop if across == 1 else Qt.AlignmentFlag(0)  # beside what may wrap
+    alignment = Qt.AlignmentFlag.AlignTop if across == 1 else Qt.AlignmentFlag(0)  # next to text that may wrap
     for index, (name, widget) in enumerate(values):
         row, column = index // across, 2 * (index % across)
         grid.addWidget(label(name, role), row, column, alignment)
@@ -269,7 +269,7 @@ def label_grid(values: Iterable[tuple[str, QWidget]], across: int = 1, role: str
 
 
 def scroll_area(inside: QWidget, area: QScrollArea | None = None) -> QScrollArea:
-    """Return a frameless area, a new one unless given, in which `inside` moves where it is greater than its room."""
+    """Return a frameless scroll area, a new one unless given, around `inside`."""
     area = area or QScrollArea()
     area.setWidget(inside)
     area.setWidgetResizable(True)
@@ -280,7 +280,7 @@ def scroll_area(inside: QWidget, area: QScrollArea | None = None) -> QScrollArea
 
 
 def regrade(widget: QWidget, value: str, property_name: str = "grade") -> None:
-    """Give a widget another grade, or role, of the style sheet."""
+    """Change the grade, or role, of a widget in the style sheet."""
     if widget.property(property_name) != value:
         widget.setProperty(property_name, value)
         for child in (widget, *widget.findChildren(QWidget)):
@@ -289,8 +289,8 @@ def regrade(widget: QWidget, value: str, property_name: str = "grade") -> None:
 
 
 def set_text(widget: QLabel, text: str, name: str = "", grade: str | None = None) -> None:
-    """Show a text. A screen reader says it after the `name` of what it shows; without a name the text alone."""
-    widget.setText(breakable(text) if widget.wordWrap() else text)  # Qt itself does nothing where it is the same
+    """Show a text, which a screen reader reads after `name`, or alone without one."""
+    widget.setText(breakable(text) if widget.wordWrap() else text)  # Qt ignores an equal text
     if name:
         widget.setAccessibleName(f"{name} {text or tr('nothing')}")
     if grade is not None:
@@ -298,15 +298,15 @@ def set_text(widget: QLabel, text: str, name: str = "", grade: str | None = None
 
 
 def field(text: str, widget: QWidget, *more: QWidget) -> QVBoxLayout:
-    """Return a caption over an input field, and further widgets beside the field."""
+    """Return a caption above an input field, and further widgets next to the field."""
     caption = label(text, "quiet", wrap=True)
-    if not isinstance(widget, _Choice):  # it has a label of its own
+    if not isinstance(widget, _Choice):  # which has its own label
         caption.setBuddy(widget)
     return vbox(caption, hbox((widget, 1), *more), spacing=4)
 
 
 def tick(text: str, name: str) -> QCheckBox:
-    """Return a box to tick that says `name` to screen readers."""
+    """Return a check box named `name` for screen readers."""
     box = QCheckBox(text)
     box.setAccessibleName(name)
     box.setMinimumHeight(TARGET - GRID)
@@ -314,7 +314,7 @@ def tick(text: str, name: str) -> QCheckBox:
 
 
 def entry(name: str, empty: str = "") -> QLineEdit:
-    """Return a line to type in that says `name` to screen readers, and shows `empty` while it is."""
+    """Return an input line named `name` for screen readers, with the placeholder `empty`."""
     line = QLineEdit()
     line.setPlaceholderText(empty)
     line.setAccessibleName(name)
@@ -322,15 +322,15 @@ def entry(name: str, empty: str = "") -> QLineEdit:
 
 
 class Openness:
-    """Whether a part is open, remembered under a `key` where there is room for the part and its neighbour.
+    """Whether a part is open, remembered under a `key` if there is room for the part and its neighbour.
 
-    Where there is none it begins closed, and opening it is not remembered. `on_change` is called when it has changed.
+    Without room it begins closed, and opening it is not remembered. `on_change` is called after a change.
     """
 
     def __init__(self, key: str, on_change: Callable[[], object]) -> None:
         self._key, self._on_change = key, on_change
         self._wish = settings().value(key) != "no"
-        self._instead = False  # it was opened where there is no room
+        self._instead = False  # opened without room, in place of the neighbour
         self.room = True
 
     def __bool__(self) -> bool:
@@ -352,7 +352,7 @@ class Openness:
 
 
 class Drawer(QSplitter):
-    """What is always there, and a drawer at its right that remembers whether it is open and how wide it is."""
+    """A permanent part with a drawer on its right, whose openness and width are remembered."""
 
     def __init__(self, main: QWidget, drawer: QWidget) -> None:
         super().__init__(Qt.Orientation.Horizontal)
@@ -372,7 +372,7 @@ class Drawer(QSplitter):
         self._show_panes()
 
     def least_height(self) -> int:
-        """Return the height that those of its two parts need that are shown [px]."""
+        """Return the height that its visible parts need [px]."""
         layouts = [layout for pane in (self._main, self._drawer) if not pane.isHidden() and (layout := pane.layout())]
         return max(layout.totalMinimumSize().height() for layout in layouts)
 

@@ -27,16 +27,16 @@ from sessions.strokes.stroke import digits
 
 _FILE_FORMATS = ("SVG", "PNG", "CSV")
 Save = Callable[[str, str], object]  # name of a picture, and the path to write it to
-_DENSITY = 2.0  # pixels of a saved picture for one of the window's [-]
-_STEP_MS = 100  # each state of a film [ms]: as long as the window shows it at its usual speed
-_LOOK = 0.02  # between two looks at a film that is being written [s]
-_COLOURS = 256  # of a frame of a GIF: all that the format has
+_DENSITY = 2.0  # pixels of a saved picture per pixel of the window [-]
+_STEP_MS = 100  # duration of each state in a film, as in the window at normal speed [ms]
+_LOOK = 0.02  # between two polls of a film being written [s]
+_COLOURS = 256  # of a GIF frame: the format's maximum
 FILM_SUFFIXES = (".gif", ".mp4")
 NO_MP4 = tr_noop("MP4 needs the package imageio-ffmpeg: pip install 'daq-app[film]', or save the film as GIF")
 
 
 class SaveButtons(QWidget):
-    """Saves a picture by its name."""
+    """Buttons that save a picture by its name."""
 
     def __init__(self, subject: str, save: Save) -> None:
         super().__init__()
@@ -71,7 +71,7 @@ class PictureView(QWidget):
         vbox((self._canvas, 1), self.save, on=self)
 
     def show_picture(self, name: str, title: str, png: bytes) -> None:
-        """Show a picture by its PNG; where that is empty, `title` says why."""
+        """Show a picture from its PNG; if that is empty, `title` says why."""
         self._canvas.show_png(png, title)
         self._canvas.setAccessibleName(title)
         self.setAccessibleName(title)
@@ -79,7 +79,7 @@ class PictureView(QWidget):
 
 
 class _Canvas(QWidget):
-    """Paints a picture as large as there is room, its proportions kept; its own colours are made for paper."""
+    """Paints a picture as large as fits with its proportions, in its own colours, which are made for paper."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -133,7 +133,7 @@ class ComparedView(QWidget):
 
 
 def write_picture(canvas: FingerCanvas, heading: str, path: Path) -> None:
-    """Write what `canvas` shows as the suffix says: `.svg`, `.csv` or PNG. `heading` stands over it. Raises OSError."""
+    """Write the content of `canvas` by suffix: `.svg`, `.csv`, else PNG, below a `heading`. Raises OSError."""
     buffer = QBuffer()
     match path.suffix.lower():
         case ".csv":
@@ -164,9 +164,9 @@ def _image(canvas: FingerCanvas, density: float, heading: str) -> QImage:
 
 
 def write_film(canvas: FingerCanvas, heading: str, show: Callable[[int], None], count: int, path: Path) -> str:
-    """Write `count` states that `show` puts on `canvas`, a `heading` over them; return where it is, or why it is not.
+    """Write `count` states that `show` puts on `canvas` below a `heading`; return a message with the path, or why not.
 
-    It is an MP4 where the suffix says so, and else a GIF. Meanwhile the window goes on behind a dialog that can cancel.
+    The suffix decides between MP4 and GIF (default). The window keeps running behind a dialog that can cancel.
     """
     dialog = QProgressDialog(tr("Writing the film"), "", 0, count + 1, canvas.window())
     cancel = QPushButton(tr("Cancel"))
@@ -202,7 +202,7 @@ def write_film(canvas: FingerCanvas, heading: str, show: Callable[[int], None], 
 
 
 def _write_film(path: Path, frames: list[Image.Image]) -> None:
-    """Write the film whole or not at all."""
+    """Write the film completely or not at all."""
     if path.suffix.lower() == ".mp4":
         write_whole(path, _mp4(frames))
         return
@@ -212,16 +212,16 @@ def _write_film(path: Path, frames: list[Image.Image]) -> None:
 
 
 def _mp4(frames: list[Image.Image]) -> bytes:
-    """Return an MP4 (H.264) that every browser shows. Raises ImportError where the encoder is not installed."""
+    """Return an MP4 (H.264) that every browser plays. Raises ImportError if the encoder is not installed."""
     try:
         from imageio_ffmpeg import get_ffmpeg_exe
     except ImportError as error:
         raise ImportError(tr(NO_MP4)) from error
-    width, height = (length - length % 2 for length in frames[0].size)  # colours are kept for four pixels together
+    width, height = (length - length % 2 for length in frames[0].size)  # the format shares colours between 2 x 2 pixels
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{1000 / _STEP_MS:g}", "-i", "-"]
     codec = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "18", "-movflags", "+faststart"]
     pixels = b"".join(frame.crop((0, 0, width, height)).tobytes() for frame in frames)
-    with TemporaryDirectory() as folder:  # the place of an MP4's parts is known at its end: no pipe takes it
+    with TemporaryDirectory() as folder:  # an MP4 needs seeking, so a pipe does not work
         film = Path(folder) / "film.mp4"
         encoder = [get_ffmpeg_exe(), "-loglevel", "error", *source, *codec, str(film)]
         result = subprocess.run(encoder, input=pixels, capture_output=True, check=False)

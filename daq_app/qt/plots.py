@@ -1,4 +1,4 @@
-"""Plots that the wheel zooms and the mouse moves; a field of the finger as a curve, and which field it is."""
+"""Plots that zoom with the wheel and move with the mouse; curves of a field, and its selection."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -18,7 +18,7 @@ from daq_app.wording import tr, tr_noop
 from drivers.arrays import Array
 from solver.prediction import ROW
 
-pg: Any = pyqtgraph  # it has no types: who draws by it imports it from here
+pg: Any = pyqtgraph  # has no types: other modules import it from here
 Curve = tuple[Array, Array]
 _NOTHING: Curve = (np.empty(0), np.empty(0))
 _NAMES = ("A", "B")  # of two sessions
@@ -34,15 +34,15 @@ _LARGEST = 1e6  # in a number field: far beyond any stress or strain of tissue
 
 
 class RoomyAxis(pg.AxisItem):
-    """A vertical axis with a whole name, whose numbers are no nearer to each other than a line of them is high."""
+    """A vertical axis with a complete name, whose labels are at least a line apart."""
 
     def resizeEvent(self, event: object = None) -> None:
-        """Centre the name; one longer than the axis begins at its top, and ends beside the numbers under the plot."""
+        """Centre the name; one longer than the axis begins at its top, and ends next to the labels below the plot."""
         pg.AxisItem.resizeEvent(self, event)
         self.label.setY(max(self.label.y(), self.label.boundingRect().width()))
 
     def tickSpacing(self, least: float, greatest: float, size: float) -> list[tuple[float, float]]:  # noqa: N802  Qt's
-        """Return spacings and offsets of the numbers on `size` pixels, the widest first."""
+        """Return spacings and offsets of the labels on `size` pixels, the widest first."""
         spacings = pg.AxisItem.tickSpacing(self, least, greatest, size)
         spacing = QFontMetricsF(self.style["tickFont"]).height() * (greatest - least) / size
         if not spacings or spacings[0][0] >= spacing:
@@ -73,7 +73,7 @@ def name_axis(axis: Any, text: str) -> None:  # noqa: ANN401  pyqtgraph has no t
 
 
 class ZoomedPlot(pg.PlotWidget):
-    """A plot in the colours of a theme; `reset` shows all of it, `read` says what stands at a place across."""
+    """A plot in the colours of a theme; `reset` shows all of it, `read` returns the text at a position."""
 
     reset: Callable[[], None]
     read: Callable[[float], str] | None = None
@@ -83,7 +83,7 @@ class ZoomedPlot(pg.PlotWidget):
         pg.PlotWidget.__init__(self, background=tokens.surface, axisItems=axes, enableMenu=False)
         self._names: Any = None
         self._text = tokens.text
-        self.setMinimumSize(120, round(100 + 160 * (type_scale() - 1)))  # the axes take what the type needs
+        self.setMinimumSize(120, round(100 + 160 * (type_scale() - 1)))  # the axes grow with the type
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.setToolTip(tr("Wheel: zoom. Drag: move. Home or double-click: show all."))
         item: Any = self.getPlotItem()
@@ -100,19 +100,19 @@ class ZoomedPlot(pg.PlotWidget):
             style_axis(item.getAxis(side), tokens, font(SMALL))
 
     def name_across(self, name: str) -> None:
-        """Name the horizontal axis in one or two lines, under its numbers."""
+        """Name the horizontal axis in one or two lines, below its labels."""
         axis: Any = self.getPlotItem().getAxis("bottom")
         name_axis(axis, name)
         above = axis.style["tickTextOffset"][1] + QFontMetricsF(axis.style["tickFont"]).height()
         axis.setHeight(round(above + axis.label.boundingRect().height()))
 
     def show_numbers(self, *, visible: bool) -> None:
-        """Show the numbers along both axes, or none: a plot of nothing has no scale."""
+        """Show the labels of both axes, or hide them: an empty plot has no scale."""
         for side in ("left", "bottom"):
             self.getPlotItem().getAxis(side).setStyle(showValues=visible)
 
     def name_curves(self, curves: Sequence[Any], corner: tuple[float, float] = (0.5, 1.0)) -> None:
-        """Name curves, each beside a piece of its line; `corner` is where, from 0, 0 at the top left to 1, 1."""
+        """Add a legend of curves at `corner`, from 0, 0 at the top left to 1, 1."""
         if self._names is not None:
             self._names.scene().removeItem(self._names)
             self._names = None
@@ -163,7 +163,7 @@ class ZoomedPlot(pg.PlotWidget):
 
 
 class FieldPlot(QWidget):
-    """A list of what is plotted, a button to draw a line, and the plot."""
+    """A list of curves, a button to draw a line, and the plot."""
 
     changed = Signal()
 
@@ -174,9 +174,9 @@ class FieldPlot(QWidget):
         self.draw = button(tr("Line"), name, lambda: None, "small", checkable=True)
         self.plot = ZoomedPlot(tokens)
         self.plot.read = self._read
-        self.plot.setMinimumHeight(self.plot.minimumHeight() + 2 * GRID)  # two lines of words under it
+        self.plot.setMinimumHeight(self.plot.minimumHeight() + 2 * GRID)  # two lines of text below it
         self.values, self._unit = [_NOTHING], ""
-        self._named = False  # two curves are
+        self._named = False  # two curves have a legend
         pens = (pg.mkPen(MODEL, width=2, style=style) for style in (Qt.PenStyle.SolidLine, Qt.PenStyle.DashLine))
         self._curves = [
             pg.PlotDataItem(pen=pen, connect="finite", symbolSize=4, symbolPen=None, name=name)
@@ -220,7 +220,7 @@ class FieldPlot(QWidget):
 
 
 def _curve(frame: Frame | None, source: int, field: FieldChoice, line: Line | None) -> Curve:
-    """Return places (m,) [mm] and values (m,) of what is plotted; none where the finger has none."""
+    """Return positions (m,) [mm] and values (m,) of a curve; empty if the finger has none."""
     if frame is None:
         return _NOTHING
     if source == _RECEPTORS:
@@ -231,7 +231,7 @@ def _curve(frame: Frame | None, source: int, field: FieldChoice, line: Line | No
 
 
 class FieldBar(QWidget):
-    """Two lists and two numbers."""
+    """Lists of fields and of colour ranges, and the two ends of a fixed range."""
 
     changed = Signal()
 
@@ -254,11 +254,11 @@ class FieldBar(QWidget):
 
     @property
     def mode(self) -> int:
-        """`ALL_TRIALS`, `OWN` or `FIXED_RANGE`."""
+        """Return `ALL_TRIALS`, `OWN` or `FIXED_RANGE`."""
         return self.ranges.currentIndex()
 
     def range(self, automatic: Range) -> Range:
-        """Return where colours begin and end: as given, or as somebody fixed them, the lesser number first."""
+        """Return the colour range: `automatic`, or the fixed ends in ascending order."""
         self._automatic = automatic
         limits = sorted((self.low.value(), self.high.value()))
         return (limits[0], limits[1]) if self.mode == FIXED_RANGE and limits[0] < limits[1] else automatic
@@ -269,14 +269,14 @@ class FieldBar(QWidget):
         self._fix()
 
     def _free(self) -> None:
-        """Fit the colours to another field: numbers that were fixed are of another unit."""
+        """Reset a fixed range after a change of field: its numbers are in another unit."""
         if self.mode == FIXED_RANGE:
             self.ranges.setCurrentIndex(ALL_TRIALS)
         else:
             self.changed.emit()
 
     def _fix(self) -> None:
-        """Begin fixed colours with those that were shown."""
+        """Begin a fixed range with the displayed one."""
         for number, limit in zip((self.low, self.high), self._automatic, strict=True):
             number.setVisible(self.mode == FIXED_RANGE)
             with QSignalBlocker(number):
@@ -287,7 +287,7 @@ class FieldBar(QWidget):
 
 
 class _NumberField(QDoubleSpinBox):
-    """A number with a point in every country; a comma is a point."""
+    """A number field with a decimal point in every locale; a comma counts as a point."""
 
     def __init__(self, name: str) -> None:
         super().__init__()

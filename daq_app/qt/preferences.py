@@ -1,4 +1,4 @@
-"""What the window remembers from one start to the next: looks, language, place, sessions, and the screens' sizes."""
+"""The window's stored preferences: theme, language, position, sessions, and the screens' sizes."""
 
 import json
 import os
@@ -17,26 +17,26 @@ from sessions.recording import Setting
 
 THEMES = tr_noop(("system", "light", "dark"))
 SCALES = (1.0, 1.25, 1.5, 2.0)  # of the type [-]
-RECENT = 12  # sessions that are offered
-FRAME = QSize(16, 48)  # that a desktop draws around a window, title bar included [px]
+RECENT = 12  # most sessions offered
+FRAME = QSize(16, 48)  # of a window on the desktop, title bar included [px]
 DRAWER = "window/drawer open"
 DRAWER_SIZES = "window/drawer sizes"
 THEME, SCALE, LANGUAGE = "window/theme", "window/type scale", "window/language"
-LEAST, MOST = 40.0, 250.0  # what 100 mm may measure on a screen before it is taken for a slip of the hand [mm]
-PLAUSIBLE = (40.0, 600.0)  # dots an inch; a screen that says otherwise does not know its size
+LEAST, MOST = 40.0, 250.0  # accepted ruler lengths of the nominal 100 mm; others count as typing errors [mm]
+PLAUSIBLE = (40.0, 600.0)  # dots per inch; a screen that reports others does not know its size
 USUAL_DPI = 96.0
-USUAL_POINTS = 10.0  # size of a system's interface font that asks for no scaling
+USUAL_POINTS = 10.0  # size of a system's interface font at a scale of 1
 _GEOMETRY, _RECENT = "window/geometry", "window/recent sessions"
 
 
 def theme() -> str:
-    """Return the theme that was chosen, one of THEMES."""
+    """Return the chosen theme, one of THEMES."""
     name = str(settings().value(THEME))
     return name if name in THEMES else "system"
 
 
 def preferred_scale() -> float:
-    """Return how much larger than usual type is to be [-]: as it was chosen, or as the system asks for."""
+    """Return the scale of the type relative to the usual [-], chosen or from the system."""
     try:
         scale = float(str(settings().value(SCALE)))
     except ValueError:
@@ -44,23 +44,23 @@ def preferred_scale() -> float:
     return scale if scale in SCALES else font_scale()
 
 
-type_scale = cache(preferred_scale)  # of the type of this run: a choice holds from the next start on
+type_scale = cache(preferred_scale)  # fixed for this run: a choice takes effect at the next start
 
 
 def font_scale() -> float:
-    """Return how much larger than usual the system wants its type [-], from 1 to 2."""
+    """Return the system's scale of type [-], limited to 1 to 2."""
     points = QFontInfo(QGuiApplication.font()).pointSizeF()
     return min(max(points / USUAL_POINTS, 1.0), 2.0) if points > 0 else 1.0
 
 
 def language() -> str:
-    """Return the language of the experimenter's windows: as it was chosen, or as the environment says."""
+    """Return the language of the experimenter's windows, chosen or from the environment."""
     code = str(settings().value(LANGUAGE) or os.environ.get(VARIABLE))
     return code if code in languages(EXPERIMENTER) else SOURCE_LANGUAGE
 
 
 def recent_sessions() -> tuple[Path, ...]:
-    """Return the sessions that were recorded or opened last and are still there, the newest first."""
+    """Return the existing sessions that were recorded or opened last, the newest first."""
     try:
         entries = json.loads(str(settings().value(_RECENT)))
     except ValueError:
@@ -77,12 +77,12 @@ def remember_session(folder: Path) -> None:
 
 
 def save_place(window: QWidget) -> None:
-    """Remember where a window is, and how large."""
+    """Store the position and size of a window."""
     settings().setValue(_GEOMETRY, window.saveGeometry())
 
 
 def restore_place(window: QWidget) -> None:
-    """Put a window where it was; Qt brings it back onto a screen that is there."""
+    """Restore the position and size of a window; Qt moves it onto an existing screen."""
     geometry = settings().value(_GEOMETRY)
     if isinstance(geometry, QByteArray):
         window.restoreGeometry(geometry)
@@ -91,18 +91,18 @@ def restore_place(window: QWidget) -> None:
 
 
 def resize_to_hint(window: QWidget) -> None:
-    """Make a window as large as it likes where there is room: Qt itself takes at most two thirds of a screen."""
+    """Resize a window to its size hint, within the screen; Qt itself takes at most two thirds of a screen."""
     window.resize(window.sizeHint().boundedTo(window.screen().availableSize() - FRAME))
 
 
 def settings() -> QSettings:
-    """Return what the window remembers on this computer: its looks, the screens' sizes, and folders of sessions."""
-    # A file on every system: the format that follows the system cannot be led elsewhere by a test.
+    """Return the stored preferences of this computer."""
+    # A file on every system: tests cannot redirect the native format.
     return QSettings(QSettings.Format.IniFormat, QSettings.Scope.UserScope, "daq-app", "window")
 
 
 def name_of(language: str) -> str:
-    """Return what a language calls itself, with its code.
+    """Return the native name of a language, with its code.
 
     >>> name_of("de")
     'Deutsch (de)'
@@ -113,10 +113,10 @@ def name_of(language: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Millimetres:
-    """What is known of a screen's size."""
+    """The scale of a screen."""
 
-    pixels: float  # device-independent pixels in a millimetre
-    checked: bool  # somebody held a ruler to it
+    pixels: float  # device-independent pixels per millimetre
+    checked: bool  # measured with a ruler
 
     @property
     def origin(self) -> str:
@@ -133,7 +133,7 @@ def millimetres(screen: QScreen) -> Millimetres:
 
 
 def store_ruler_length(screen: QScreen, length: float) -> Millimetres | None:
-    """Store how long a line of nominally 100 mm is on the screen [mm]; None where no screen can show it so."""
+    """Store the measured length of a nominally 100 mm line on the screen [mm]; None if it is implausible."""
     if not LEAST <= length <= MOST:
         return None
     pixels = millimetres(screen).pixels * 100.0 / length
@@ -142,13 +142,13 @@ def store_ruler_length(screen: QScreen, length: float) -> Millimetres | None:
 
 
 def _pixels_per_mm(screen: QScreen) -> float:
-    """Return the screen's own device-independent pixels per millimetre, the usual number where it is not plausible."""
+    """Return the screen's own device-independent pixels per millimetre, or the usual value if it is implausible."""
     dots = screen.physicalDotsPerInch() * screen.devicePixelRatio()
     return (screen.physicalDotsPerInch() if PLAUSIBLE[0] <= dots <= PLAUSIBLE[1] else USUAL_DPI) / 25.4
 
 
 def _key(screen: QScreen) -> str:
-    """Return the name of a screen: of this very one where it has a serial number, at this scaling."""
+    """Return a key for a screen at its scaling, unique if it has a serial number."""
     names = (screen.manufacturer(), screen.model(), screen.serialNumber(), screen.name())
     name = "-".join(filter(None, names)) or "screen"
     safe = "".join(character if character.isalnum() or character == "-" else "_" for character in name)
@@ -156,7 +156,7 @@ def _key(screen: QScreen) -> str:
 
 
 def line_settings(scale: Millimetres) -> tuple[Setting, ...]:
-    """Return what a session keeps of the line that is answered on: its length, and how long a millimetre is."""
+    """Return the settings that a session stores about the answer line: its length, and pixels per millimetre."""
     origin = "measured" if scale.checked else "default"
     return (
         Setting("answer line length", LENGTH, "mm", origin),

@@ -1,4 +1,4 @@
-"""The ways through the window: its menu, the rail, and the rooms. Menu entries are acts that keys do too."""
+"""Navigation of the window: menu, rail and rooms. Menu entries have the same actions as keys."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -56,11 +56,11 @@ PANELS = (
 _LIBRARIES = ("PySide6-Essentials", "numpy", "scipy", "numba")
 LIST_WIDTH = 200  # of the recent sessions, before the font's scale [px]
 _STAMP = re.compile(r"(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)")  # in the name of a session's folder
-LEAST_FOR_LIST = 760  # width for the list beside an open session: in less the menu alone lists them; likewise [px]
+LEAST_FOR_LIST = 760  # width from which the list is next to an open session, before the font's scale [px]
 
 
 class Rail(Panel):
-    """Three buttons, one for each room; that of the room that is shown stays pressed."""
+    """Three buttons, one for each room; the button of the current room stays pressed."""
 
     def __init__(self, go: Callable[[Room], None]) -> None:
         super().__init__(tr("rooms"), "strip")
@@ -72,7 +72,7 @@ class Rail(Panel):
         self.setFixedWidth(px(_WIDTH, most=1.4))
 
     def show_room(self, room: Room, *, in_hand: bool, session_over: bool) -> None:
-        """Show which room is open, and which can be; a session may be `in_hand`, or `session_over`."""
+        """Show the current room and the available ones; a session may be `in_hand`, or `session_over`."""
         for name, widget in self.buttons.items():
             widget.setChecked(name == room)
             closed = (name == "prepare" and in_hand and not session_over) or (name == "run" and not in_hand)
@@ -85,7 +85,7 @@ class Menus:
     """Fills the menu bar of a window."""
 
     def __init__(self, window: QMainWindow, act: Callable[[str], None]) -> None:
-        """Build the menu; `act` does what an entry stands for, or what follows a preference that was chosen."""
+        """Build the menu; `act` carries out the action of an entry, or the change of a preference."""
         self._act = act
         bar = window.menuBar()
         if (more := bar.findChild(QToolButton)) is not None:
@@ -135,11 +135,11 @@ class Menus:
             action.setEnabled(session_open)
 
     def _add(self, menu: QMenu, name: str, text: str) -> QAction:
-        """Return an entry; its key is shown, and stays with the window, which routes keys by their meaning."""
+        """Return an entry that shows its key; the key itself is routed by the window."""
         return menu.addAction(f"{text}\t{KEY_OF.get(name, '')}".rstrip(), lambda: self._act(name))
 
     def _choices(self, menu: QMenu, preference: str, values: Mapping[str, object], now: object) -> QActionGroup:
-        """Return an entry for each value of a preference, by its name, that remembers it and does what follows."""
+        """Return an entry for each value of a preference, by name, which stores and applies it."""
 
         def choose(value: object) -> None:
             preferences.settings().setValue(preference, str(value))
@@ -164,14 +164,14 @@ class Menus:
 
 
 def about_box(parent: QWidget) -> QMessageBox:
-    """Return a box with the versions, which goes when it is closed."""
+    """Return a box with the versions, deleted when it is closed."""
     box = QMessageBox(QMessageBox.Icon.NoIcon, tr("About daq-app"), about_text(), parent=parent)
     box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     return box
 
 
 def about_text() -> str:
-    """Return the versions of the program and of what it stands on."""
+    """Return the versions of the program and of its libraries."""
     versions = [f"daq-app {_version('daq-app')}", f"Python {python_version()}", f"Qt {qVersion()}"]
     return "\n".join((*versions, *(f"{name} {_version(name)}" for name in _LIBRARIES)))
 
@@ -184,12 +184,12 @@ def _version(name: str) -> str:
 
 
 class ReviewRoom(QWidget):
-    """One session at a time; another takes its place."""
+    """Shows one session at a time."""
 
     def __init__(self) -> None:
         super().__init__()
         self.analyst: AnalystWindow | None = None
-        self._has_room = False  # for the list beside an open session
+        self._has_room = False  # for the list next to an open session
         self.recent = row_list(tr("recent sessions"))
         self.recent.itemActivated.connect(self._open_item)
         self.recent.itemClicked.connect(self._open_item)
@@ -212,14 +212,14 @@ class ReviewRoom(QWidget):
             self.open(Path(name))
 
     def open(self, folder: Path) -> None:
-        """Open a session in place of the one that is open."""
+        """Open a session in place of the current one."""
         folder = folder.absolute()
         if self.analyst is not None and self.analyst.state.folder == folder:
             return
         self.leave()
         remember_session(folder)
         self._list()
-        from daq_app.qt.analyst_window import AnalystWindow  # loaded when somebody looks at a session
+        from daq_app.qt.analyst_window import AnalystWindow  # slow to load, so only when a session is opened
 
         self._show_analyst(AnalystWindow(folder, theme_of(self)))
 
@@ -232,18 +232,18 @@ class ReviewRoom(QWidget):
             self._show_list()
 
     def fit(self, width: int) -> None:
-        """Take a width, seen or not; a narrow room has no list beside an open session."""
+        """Adjust to a width, even while hidden; a narrow room has no list next to an open session."""
         self._has_room = width >= px(LEAST_FOR_LIST)
         self._show_list()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Show the session in the colours of another theme, once all else has them."""
+        """Show the session in the colours of a new theme, after all other parts."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.StyleChange:
             QTimer.singleShot(0, self, self._follow_theme)
 
     def _follow_theme(self) -> None:
-        """Show the session in another window: plots keep the colours that they were made with."""
+        """Show the session in a new window, because plots keep their initial colours."""
         previous, tokens = self.analyst, theme_of(self)
         if previous is not None and previous.tokens is not tokens:
             self._show_analyst(previous.hand_over(tokens))
@@ -270,7 +270,7 @@ class ReviewRoom(QWidget):
         some, none = tr("Choose a session at the left, or open one."), tr("No session was recorded or opened yet.")
         set_text(self._none, some if folders else none)
         for folder in folders:
-            lines = "\n".join(folder.name.rsplit("_", 2))  # subject, protocol, time: none is cut off
+            lines = "\n".join(folder.name.rsplit("_", 2))  # subject, protocol, time: none truncated
             item = QListWidgetItem(_STAMP.sub(r"\1-\2-\3 \4:\5:\6", lines))
             item.setToolTip(str(folder))
             item.setData(Qt.ItemDataRole.UserRole, str(folder))
@@ -281,14 +281,14 @@ class ReviewRoom(QWidget):
 
 
 class Rooms(QStackedWidget):
-    """Shows one room; rail and menu say which, and which others can be entered."""
+    """Shows one room; rail and menu show which one, and which others are available."""
 
     def __init__(self, bridge: Bridge, rail: Rail, menus: Menus) -> None:
-        """Show nothing yet: the room of the session in hand is the first widget that is added."""
+        """Show nothing yet: the room of the current session is the first widget added."""
         super().__init__()
         self._bridge, self._rail, self._menus = bridge, rail, menus
-        self._recent_folder: str | None = None  # folder of the session that was put among the recent ones
-        self.review = ReviewRoom()  # added when it is first entered
+        self._recent_folder: str | None = None  # folder of the session added to the recent ones
+        self.review = ReviewRoom()  # added when first entered
 
     @property
     def room(self) -> Room:
@@ -303,11 +303,11 @@ class Rooms(QStackedWidget):
 
     @property
     def analyst(self) -> "AnalystWindow | None":
-        """Return the session that is looked at; None in the other rooms."""
+        """Return the open session's window; None in the other rooms."""
         return self.review.analyst if self.room == "review" else None
 
     def go_to(self, room: Room) -> None:
-        """Show a room, where it can be: Review on the session that has just ended, or else on the newest."""
+        """Show a room, if available: Review with the session that has just ended, else with the newest."""
         session = self._bridge.state.session
         if room != "review":
             self.setCurrentIndex(0)
@@ -328,10 +328,10 @@ class Rooms(QStackedWidget):
         self.show_state()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        self.review.fit(event.size().width())  # also while another room is shown, which it would hold open
+        self.review.fit(event.size().width())  # even while hidden, or it would keep the window wide
 
     def show_state(self) -> None:
-        """Show in rail and menu what can be done now, and keep a session that has ended among the recent ones."""
+        """Update rail and menu, and add an ended session to the recent ones."""
         session = self._bridge.state.session
         if session is not None and session.is_over and session.folder != self._recent_folder:
             self._recent_folder = session.folder

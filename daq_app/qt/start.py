@@ -1,4 +1,4 @@
-"""Starts the window: checks that there is a screen, opens it at once with the simulated bench, and runs it."""
+"""Starts the window: checks for a screen, opens the window with the simulated bench, and runs it."""
 
 import ctypes
 import gc
@@ -16,7 +16,7 @@ from weakref import WeakMethod
 from daq_app.console import FAILED, STOPPED, WRONG, NotWritten, Parser, WrongValue
 from daq_app.wording import VARIABLE
 
-if TYPE_CHECKING:  # Qt is loaded only once it is known that it can be
+if TYPE_CHECKING:  # Qt is loaded only after a check that it can be
     from PySide6.QtWidgets import QApplication, QWidget
 
     from daq_app.qt.analyst_window import AnalystWindow
@@ -31,7 +31,7 @@ NO_SCREEN = (
     "there is no screen to open a window on: start it from a desktop (or under xvfb-run), "
     "or use the command line, 'daq-app --help'"
 )
-# What Qt loads to speak X11, and the Debian package that holds it.
+# Libraries that Qt loads for X11, and their Debian packages.
 _LIBRARIES = {
     "libxcb-cursor.so.0": "libxcb-cursor0",
     "libxcb-icccm.so.4": "libxcb-icccm4",
@@ -81,7 +81,7 @@ def window(arguments: list[str]) -> int:
 
 
 def command_line() -> Parser:
-    """Return what `daq-app window` understands."""
+    """Return the parser of `daq-app window`."""
     parser = Parser("daq-app window", description="Open the window.", epilog="Example: daq-app window recordings/P07")
     parser.add_argument("session", nargs="?", type=Path, metavar="SESSION", help="a session to review (a new one)")
     meaning = "where the subject's page is: a window here, or a tablet's browser on the lab's network (window)"
@@ -93,7 +93,7 @@ def command_line() -> Parser:
 
 @contextmanager
 def _without_garbage_collection() -> Generator[None]:
-    """Collect no garbage inside, and never what was made inside: it stays, and searching it would delay the window."""
+    """Disable garbage collection in the context, and exempt its objects for good, as they live with the window."""
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -111,9 +111,9 @@ def open_window(
     theme: "Tokens | None" = None,
     tablet: "TabletScreen | None" = None,
 ) -> "MainWindow":
-    """Return the experimenter's window with the simulated bench being connected; `start` makes a recorder.
+    """Return the experimenter's window while the simulated bench connects; `start` makes a recorder.
 
-    Without a `theme` that of the system is followed. With a `tablet` the subject's page is there.
+    Without a `theme` the window follows the system's. With a `tablet` the subject's page is on it.
     """
     from daq_app.recorder.client import Recorder
     from daq_app.recorder.messages import Connect
@@ -138,16 +138,16 @@ def open_window(
     if theme is None:
         application.styleHints().colorSchemeChanged.connect(follow_theme)
 
-    # Python keeps its hook to the very end; a bridge that it kept would be disconnected there, which crashes PySide.
+    # Python keeps its hook until exit; a bridge kept by it would be disconnected there, which crashes PySide.
     report = WeakMethod(bridge.report_drawing_failure)
 
     def show_error(_type: type[BaseException], error: BaseException, _trace: TracebackType | None) -> None:
-        """Say what went wrong in the window, which goes on: an error of ours there never stops a recording."""
+        """Report an error in the window, which continues: a bug there never stops a recording."""
         if isinstance(error, Exception) and (report_failure := report()) is not None:
             report_failure(error)
 
     sys.excepthook = show_error
-    if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:  # from now on Ctrl-C in a terminal ends no session
+    if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:  # from now on Ctrl-C in a terminal must not end a session
         signal.signal(signal.SIGINT, signal.default_int_handler)
     bridge.begin()
     return window
@@ -161,10 +161,10 @@ def _tablet(address: str | None) -> "TabletScreen":
 
 
 def _show_window(build: "Callable[[QApplication], QWidget]", modules: tuple[str, ...] = ()) -> int:
-    """Show the window that is made of `modules` until it is closed; return the exit code, or say what is missing."""
+    """Show the window, after loading `modules`, until it is closed; return the exit code, or report what is missing."""
     if problem := what_is_missing():
         return _fail(problem)
-    for module in modules:  # before Qt's, for PySide reads the source of every module that is loaded after it
+    for module in modules:  # before Qt's, because PySide reads the source of every module loaded after it
         import_module(module)
     try:
         from PySide6.QtCore import QTimer
@@ -185,7 +185,7 @@ def _show_window(build: "Callable[[QApplication], QWidget]", modules: tuple[str,
     codes: list[int] = []
 
     def stop(number: int, _frame: object) -> None:
-        """Close the window as its button does: it asks first while a session is recorded, but not on SIGTERM."""
+        """Close the window like its button: it asks first while a session is recorded, but not on SIGTERM."""
         codes.append(STOPPED)
 
         def close() -> None:
@@ -201,7 +201,7 @@ def _show_window(build: "Callable[[QApplication], QWidget]", modules: tuple[str,
 
 
 def _speak(application: "QApplication") -> None:
-    """Give this process, those that it starts and Qt's own dialogs the experimenter's language."""
+    """Set the experimenter's language for this process, its child processes and Qt's own dialogs."""
     from PySide6.QtCore import QLibraryInfo, QLocale, QTranslator
 
     from daq_app.qt import preferences
@@ -225,9 +225,9 @@ def _apply_theme(application: "QApplication", tokens: "Tokens") -> None:
     application.setDesktopFileName("daq-app")
     application.setWindowIcon(QIcon(str(ICON)))
     if not application.styleSheet():  # at the first call
-        application.setStyle("Fusion")  # the one style that draws alike, and takes our colours, everywhere
+        application.setStyle("Fusion")  # the only style with our colours and the same look everywhere
     application.setPalette(palette(tokens))
-    for box in ("QCheckBox", "QRadioButton"):  # the stub asks for bytes
+    for box in ("QCheckBox", "QRadioButton"):  # the stub expects bytes
         application.setPalette(tick_palette(tokens), box)  # pyrefly: ignore[bad-argument-type]
     application.setStyleSheet(sheet)
 
@@ -238,7 +238,7 @@ def _fail(sentence: str, code: int = FAILED) -> int:
 
 
 def what_is_missing() -> str | None:
-    """Return in one sentence why no window can be opened, and what to do; None where it can."""
+    """Return one sentence on why no window can be opened, and the remedy; None if it can."""
     if not sys.platform.startswith("linux") or os.environ.get("QT_QPA_PLATFORM", "") not in ("", "xcb"):
         return None
     if os.environ.get("WAYLAND_DISPLAY") and not os.environ.get("QT_QPA_PLATFORM"):
@@ -252,7 +252,7 @@ def what_is_missing() -> str | None:
 
 
 def missing_library(error: ImportError) -> str:
-    """Return in one sentence which library Qt could not be loaded for."""
+    """Return one sentence that names the library missing for Qt."""
     library = str(error).split(":", maxsplit=1)[0]
     if ".so" in library:
         return f"the window needs {library}, which is not on this computer: install the system package that holds it"
@@ -270,7 +270,7 @@ def _display_answers() -> bool:
     """Say whether an X server answers at DISPLAY."""
     xcb = _load("libxcb.so.1")
     if xcb is None:
-        return True  # Qt brings its own
+        return True  # Qt ships its own library
     xcb.xcb_connect.restype = ctypes.c_void_p
     xcb.xcb_connection_has_error.argtypes = [ctypes.c_void_p]
     xcb.xcb_disconnect.argtypes = [ctypes.c_void_p]

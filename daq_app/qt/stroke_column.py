@@ -1,4 +1,4 @@
-"""The chosen stroke: its curves and edges, its replay, what was decided about it, its numbers and its readings."""
+"""The chosen stroke: its curves and edges, its replay, its decisions, its numbers and its readings."""
 
 from collections.abc import Callable
 
@@ -21,23 +21,23 @@ from daq_app.wording import tr, tr_noop
 from sessions.report.contents import StrokeFinding
 
 _NUMBERS, _READINGS = range(2)  # tabs
-AUTHOR = "analyst/by"  # where the code is remembered
-NOBODY = "analyst"  # who decided, where nobody gave a code
+AUTHOR = "analyst/by"  # key under which the code is remembered
+NOBODY = "analyst"  # author of decisions without a code
 DRAGGED = "dragged by hand"
 
 
 class StrokeColumn(QWidget):
-    """All that is known of one stroke."""
+    """All data of one stroke."""
 
     def __init__(self, tokens: Tokens, ask: Callable[[m.Ask], None], on_end: Callable[[], None]) -> None:
-        """Show no stroke; `ask` orders work, `on_end` is called when a replay has come to its end."""
+        """Show no stroke; `ask` sends requests, `on_end` is called at the end of a replay."""
         super().__init__()
         self._ask = ask
         self._stroke: StrokeFinding | None = None
         self._play_next = False
-        self._moving = False  # an edge was moved, and the result is not known yet
+        self._moving = False  # an edge was moved, and the result is pending
         self._excerpt: m.Excerpt | None = None
-        self._request: tuple[int, int] | None = None  # readings that were asked for: stroke, and version of the report
+        self._request: tuple[int, int] | None = None  # requested readings: stroke, and version of the report
         self.stroke = StrokeView(tokens)
         self.stroke.moved.connect(self._drag)
         self.player = TransportBar(tr("the recorded readings"))
@@ -54,7 +54,7 @@ class StrokeColumn(QWidget):
         self._numbers.setContentsMargins(GRID, GRID // 2, GRID, GRID // 2)
         self._numbers.setLabelAlignment(Qt.AlignmentFlag.AlignLeft)
         self._numbers.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
-        self._scroll = scroll_area(inside)  # where there is little room the numbers are scrolled, never cut
+        self._scroll = scroll_area(inside)  # if space is short the numbers are scrolled, never cut
         self._scroll.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._scroll.setAccessibleName(tr("numbers of the stroke and its prediction"))
         self.tabs.addTab(self._scroll, tr("Numbers"))
@@ -74,7 +74,7 @@ class StrokeColumn(QWidget):
             self.stroke.show_stroke(stroke)
             self.save.set_name("" if stroke is None else f"stroke {stroke.number}")
             self._excerpt = None
-        elif self._moving and state.step is None:  # it was not recorded: the sentence below says why
+        elif self._moving and state.step is None:  # it was not recorded: the message below says why
             self.stroke.show_edges()
         self._moving = self._moving and state.step is not None
         sentences = () if stroke is None else stroke.decided.values()
@@ -105,14 +105,14 @@ class StrokeColumn(QWidget):
         self._scroll.setFocus()
 
     def play(self) -> None:
-        """Play the readings from their beginning as soon as they are there."""
+        """Play the readings from their beginning once they have arrived."""
         self._play_next = True
 
     def _show_readings(self, state: AnalystState) -> None:
         stroke, excerpt = self._stroke, state.excerpt
         request = None if stroke is None else (stroke.number, state.version)
         if request != self._request:
-            self._request = request  # first, for asking comes back here
+            self._request = request  # set first, because asking re-enters this function
             if stroke is not None:
                 self._ask(m.ShowReadings(stroke.number))
         if excerpt is not None and (stroke is None or excerpt.stroke != stroke.number):
@@ -143,7 +143,7 @@ class StrokeColumn(QWidget):
 
 
 class DecisionsBar(QWidget):
-    """A code, a reason, undo and redo; under them what was decided about the chosen stroke."""
+    """A code, a reason, undo and redo; below them the decisions about the chosen stroke."""
 
     def __init__(self, ask: Callable[[m.Ask], None]) -> None:
         super().__init__()

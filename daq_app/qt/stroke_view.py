@@ -1,4 +1,4 @@
-"""A stroke as it was measured: forces and their ratio over time, with the edges of its windows as handles."""
+"""A measured stroke: forces and their ratio over time, with the edges of its windows as handles."""
 
 from typing import Any
 
@@ -17,14 +17,14 @@ from daq_app.wording import tr, tr_noop
 from sessions.report.contents import StrokeFinding
 
 _NAMES: dict[Edge, str] = tr_noop({"onset": "onset", "steady begin": "steady", "steady end": "to", "lift": "lift"})
-_ROWS: dict[Edge, int] = {"onset": 0, "steady begin": 1, "steady end": 1, "lift": 0}  # of the words above the curves
+_ROWS: dict[Edge, int] = {"onset": 0, "steady begin": 1, "steady end": 1, "lift": 0}  # of the labels above the curves
 
 
 class EdgeHandle(QPushButton):
-    """Shows where an edge is; `moved` carries its place during a drag, `recorded` its last one."""
+    """Shows the time of an edge; `moved` carries it during a move, `recorded` at its end."""
 
-    moved = Signal(str, float)  # the edge, and the instant [s, device time]
-    recorded = Signal(str, float)  # likewise
+    moved = Signal(str, float)  # edge, time [s, device time]
+    recorded = Signal(str, float)  # edge, time [s, device time]
 
     def __init__(self, edge: Edge) -> None:
         super().__init__()
@@ -37,14 +37,14 @@ class EdgeHandle(QPushButton):
         self.show_edge(None, 0.0)
 
     def show_edge(self, placed: EdgePosition | None, origin: float) -> None:
-        """Show an edge, its time counted from `origin` [s]."""
+        """Show an edge, with its time from `origin` [s]."""
         self._placed, self._origin = placed, origin
         self._time = 0.0 if placed is None else placed.time
         self.setEnabled(placed is not None)
         self._show()
 
     def show_at(self, time: float) -> None:
-        """Show where the edge is being moved to [s, device time]."""
+        """Show the time to which the edge is being moved [s, device time]."""
         self._time = time
         self._show()
 
@@ -63,7 +63,7 @@ class EdgeHandle(QPushButton):
                 super().keyPressEvent(event)
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
-        """Go back to where it was: only Enter records."""
+        """Undo an unrecorded move: only Enter records."""
         if self._away:
             self._back()
         super().focusOutEvent(event)
@@ -93,9 +93,9 @@ class EdgeHandle(QPushButton):
 
 
 class StrokeView(QWidget):
-    """Two plots above each other, and a handle for each edge; the time is since contact onset."""
+    """Two plots, one above the other, and a handle for each edge; time is counted from contact onset."""
 
-    moved = Signal(str, float)  # an edge, and the instant it was moved to [s, device time]
+    moved = Signal(str, float)  # edge, new time [s, device time]
 
     def __init__(self, tokens: Tokens) -> None:
         super().__init__()
@@ -136,7 +136,7 @@ class StrokeView(QWidget):
             handle.recorded.connect(self.moved.emit)
         strip = hbox(*((handle, 1) for handle in self.handles.values()), spacing=GRID // 2)
         vbox(*((plot, 1) for plot in self._plots), strip, on=self, spacing=GRID // 2)
-        self._extent = self._range = (0.0, 1.0)  # of the forces, and of the plot with the words of edges [N]
+        self._extent = self._range = (0.0, 1.0)  # of the forces, and of the plot with the labels of edges [N]
         self._forces: Any = self._plots[0].getPlotItem().getViewBox()
         self._forces.sigResized.connect(self._make_room)
         self.show_stroke(None)
@@ -174,7 +174,7 @@ class StrokeView(QWidget):
         self._make_room()
 
     def _make_room(self) -> None:
-        """Place the words of edges in rows above the curves, unless somebody has zoomed."""
+        """Place the labels of edges in rows above the curves, unless the plot is zoomed."""
         height, metrics = max(self._forces.height(), 1.0), QFontMetricsF(font(SMALL))
         row, (low, high) = 1.25 * metrics.height() / height, self._extent
         begin, end = (self._lines[edge][0] for edge in ("steady begin", "steady end"))
@@ -194,12 +194,12 @@ class StrokeView(QWidget):
         return read_out("s", self._time, time, curves)
 
     def show_readings(self, readings: RawReadings | None) -> None:
-        """Show the readings as they were recorded, thin, behind the stroke."""
+        """Show the recorded readings as thin lines behind the stroke."""
         self._raw = readings
         self.show_moment(None)
 
     def show_moment(self, index: int | None) -> None:
-        """Show the readings up to one of them, as if they came now; None shows the stroke as a whole."""
+        """Show the readings up to one of them, as in a live plot; None shows the whole stroke."""
         raw = self._raw
         now = None if index is None or raw is None else float(raw.block.time[index]) - self._origin
         until = len(self._time) if now is None else int(np.searchsorted(self._time, now, side="right"))
@@ -239,7 +239,7 @@ class StrokeView(QWidget):
         self._make_room()
 
     def _try(self, edge: Edge, time: float) -> None:
-        """Show an edge where it is being moved to, as far as it may be."""
+        """Show an edge at the position to which it is being moved, within its limits."""
         if self._stroke is None:
             return
         inside = clamp_edge(self._stroke, edge, time)
@@ -251,9 +251,9 @@ class StrokeView(QWidget):
     def _line(self, edge: Edge, plot: Any) -> Any:  # noqa: ANN401  pyqtgraph has no types
         line: Any = pg.InfiniteLine(angle=90, movable=True, hoverPen=pg.mkPen(self._tokens.text, width=3))
         if plot is self._plots[0]:
-            side = 1.05 if edge in ("lift", "steady end") else -0.05  # where there is room, beside the line
+            side = 1.05 if edge in ("lift", "steady end") else -0.05  # on the side of the line with room
             anchors = [(side, 0.5)] * 2
-            ground = self._tokens.surface if edge == "lift" else None  # hides the end of a window close before it
+            ground = self._tokens.surface if edge == "lift" else None  # covers the end of a window just before it
             look = {"color": self._tokens.act, "fill": ground}
             line.label = pg.InfLineLabel(line, tr(edge), anchors=anchors, **look)
             line.label.setFont(font(SMALL))
@@ -269,5 +269,5 @@ def _plot(tokens: Tokens, name: str) -> Any:  # noqa: ANN401  pyqtgraph has no t
     item.showGrid(x=False, y=True, alpha=0.15)
     item.setLabel("left", name)
     metrics = QFontMetricsF(font(SMALL))
-    item.getAxis("left").setWidth(round(metrics.horizontalAdvance("00.00") + 1.5 * metrics.height()))  # both alike
+    item.getAxis("left").setWidth(round(metrics.horizontalAdvance("00.00") + 1.5 * metrics.height()))  # common
     return plot

@@ -1,4 +1,4 @@
-"""Pictures of the subject's page, drawn by the very window that the subject sees; nothing can be answered on them."""
+"""Pictures of the subject's page, drawn by the same window class as the page; they accept no answers."""
 
 from collections.abc import Sequence
 
@@ -17,15 +17,15 @@ from sessions.plan.protocols.protocol import ENGLISH
 
 THUMBNAIL_HEIGHT = 110  # before the font's scale [px]
 MIRROR_HEIGHT = 150  # of the picture, before the font's scale [px]
-MIRROR = "panels/mirror"  # under which it is remembered whether it is open
+MIRROR = "panels/mirror"  # key under which its openness is remembered
 LIST = 250  # width of the list, before the font's scale [px]
 _STEPS = {Qt.Key.Key_Left: -1, Qt.Key.Key_PageUp: -1, Qt.Key.Key_Right: 1, Qt.Key.Key_PageDown: 1, Qt.Key.Key_Space: 1}
 
 
 class SubjectPicture(QWidget):
-    """Shows a page at the size it has on the subject's screen, made as small as there is room for.
+    """Shows a page laid out for the subject's screen, scaled down to fit.
 
-    The window that draws it is a second one that nobody sees, so that the subject's answer is never in the picture.
+    A second, invisible window draws it, so that the subject's answer is never in the picture.
     """
 
     def __init__(self, size: QSize) -> None:
@@ -40,7 +40,7 @@ class SubjectPicture(QWidget):
         self.setMinimumSize(160, 100)
 
     def show_page(self, view: SubjectView, size: QSize) -> None:
-        """Show a page as it looks in a window of a size; where it asks, with the button that ends the answer."""
+        """Show a page as in a window of a size; if it asks a question, with the button that ends the answer."""
         if (view, size) == (self._view, self.page.size()):
             return
         self.page.resize(size)
@@ -49,7 +49,7 @@ class SubjectPicture(QWidget):
 
     def _draw(self, view: SubjectView) -> None:
         self._view = view
-        self.page.show()  # nowhere: it only makes Qt lay it out
+        self.page.show()  # not on a screen: it only makes Qt lay it out
         self.page.show_view(view, None)
         self.page.next.setVisible(view.asks)
         self._picture = self.page.grab()
@@ -57,7 +57,7 @@ class SubjectPicture(QWidget):
         self.update()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Redraw the page in another theme, once its window has it too."""
+        """Redraw the page in a new theme, after its window."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.StyleChange and (view := self._view) is not None:
             QTimer.singleShot(0, self, lambda: self._draw(view))
@@ -71,11 +71,11 @@ class SubjectPicture(QWidget):
 
 
 class Thumbnail(SubjectPicture):
-    """Shows the first page with a question; nothing while the form's protocol or study is refused."""
+    """Shows the first page with a question, or nothing while the form's protocol or study is refused."""
 
     def __init__(self) -> None:
         super().__init__(QSize(1000, 640))
-        self._source: object = None  # what the picture was drawn from
+        self._source: object = None  # source data of the picture
         self.setFixedHeight(px(THUMBNAIL_HEIGHT, most=1.4))
 
     def show_form(self, form: SessionForm, size: QSize) -> None:
@@ -90,21 +90,21 @@ class Thumbnail(SubjectPicture):
 
 
 class Mirror(QWidget):
-    """Shows the subject's page without any answer on it, so that it serves under every blinding."""
+    """Shows the subject's page without any answer, so that it is safe under every blinding."""
 
     def __init__(self) -> None:
         super().__init__()
         self._view: SubjectView | None = None
         self._size = QSize(1000, 640)
         self.open = Openness(MIRROR, self._show_openness)
-        self.picture: SubjectPicture | None = None  # made when it is first seen
+        self.picture: SubjectPicture | None = None  # created when first visible
         self.tab = button("", tr("the subject's page"), self.open.toggle, "handle")
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
         vbox(self.tab, on=self, spacing=4)
         self._show_openness()
 
     def show_view(self, view: SubjectView | None, size: QSize) -> None:
-        """Show a page as it looks in the subject's window of a size; None before a session."""
+        """Show a page as in the subject's window of a size; None before a session."""
         self._view, self._size = view, QSize(size)
         self._show_page()
 
@@ -126,7 +126,7 @@ class Mirror(QWidget):
 
 
 def open_preview(form: SessionForm, size: QSize, parent: QWidget) -> str:
-    """Show the pages of a form's protocol as they look in a window of a size; return why not, empty where they are."""
+    """Show the pages of a form's protocol as in a window of a size; return why that failed, or ""."""
     pages = preview(form, translator(form.language or ENGLISH))
     if isinstance(pages, Refusal):
         return " ".join(pages.values())
@@ -137,7 +137,7 @@ def open_preview(form: SessionForm, size: QSize, parent: QWidget) -> str:
 
 
 class SubjectPreview(QDialog):
-    """The pages as a list, and the picture of the one that is chosen."""
+    """A list of the pages, and the picture of the chosen one."""
 
     def __init__(self, pages: Sequence[PreviewPage], size: QSize, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -176,7 +176,7 @@ class SubjectPreview(QDialog):
 
 
 class _Pages(QListWidget):
-    """A list in which the keys that turn pages turn them too."""
+    """A list that also accepts the keys for turning pages."""
 
     def turn(self, step: int) -> None:
         self.setCurrentRow(min(max(self.currentRow() + step, 0), self.count() - 1))

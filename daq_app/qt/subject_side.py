@@ -1,4 +1,4 @@
-"""The subject's page where it is: on a second screen, over the experimenter's window for an answer, or on a tablet."""
+"""Placement of the subject's page: on a second screen, over the experimenter's window, or on a tablet."""
 
 import io
 import time
@@ -25,14 +25,14 @@ from daq_app.wording import tr
 from sessions.recording import Setting
 
 FORCE_EVERY = 0.05  # between two values of the bar [s]
-_STEPS = 200  # of the bar, that can be distinguished
+_STEPS = 200  # distinguishable steps of the bar
 
 
 class TabletScreen(QObject):
-    """One tablet at the other end of a server of our own."""
+    """The subject's page on one tablet, through a local server."""
 
     answered = Signal(object)  # an event of `run.steps`
-    changed = Signal()  # the tablet has come or gone, it has another line, or the code is a new one
+    changed = Signal()  # the tablet, its line or the code has changed
     _incoming = Signal(object, float)  # from the server's threads
     _moved = Signal()
 
@@ -40,7 +40,7 @@ class TabletScreen(QObject):
         """Serve the page at an address of this machine. Raises NoTabletServer."""
         super().__init__()
         self.session_offset = 0.0  # session clock minus this machine's monotonic one [s]
-        self._pixels: float | None = None  # in a millimetre, measured with a ruler
+        self._pixels: float | None = None  # per millimetre, measured with a ruler
         self._fraction = 0.0
         self._last_sent = 0.0  # when the bar got its last value [s]
         self._incoming.connect(self._take, Qt.ConnectionType.QueuedConnection)
@@ -60,10 +60,10 @@ class TabletScreen(QObject):
         return f"{tr('The tablet shows the page.')} {line}"
 
     def picture(self) -> bytes:
-        """Return the address with the code as a QR code, PNG; nothing once the code is used."""
+        """Return the address with the code as a QR code (PNG); empty once the code is used."""
         if self.server.code_is_used:
             return b""
-        import segno  # an optional package, which the server has looked for
+        import segno  # an optional package, already checked by the server
 
         png = io.BytesIO()
         segno.make(self.server.link, micro=False).save(png, kind="png", scale=4, border=4)
@@ -71,7 +71,7 @@ class TabletScreen(QObject):
 
     @property
     def problem(self) -> str:
-        """Return why no session can begin; empty where one can."""
+        """Return why no session can begin; empty if one can."""
         return "" if self.server.connected else self.status
 
     def show_view(self, view: SubjectView, session: SessionState | None) -> None:
@@ -85,7 +85,7 @@ class TabletScreen(QObject):
             self.server.send(Force(fraction))
 
     def line_settings(self) -> tuple[Setting, ...]:
-        """Return what a session keeps of the line that is answered on."""
+        """Return the settings that a session stores about the answer line."""
         scale = Millimetres(self._pixels or USUAL_DPI / 25.4, self._pixels is not None)
         return (Setting("subject's screen", "web", "", "set"), *line_settings(scale))
 
@@ -100,14 +100,14 @@ class TabletScreen(QObject):
                     self.answered.emit(event)
 
     def _session_time(self, sent: float, arrival: float, tablet_time: float) -> float:
-        """Return the session's clock [s] at an instant of the tablet's [ms], counted back from the answer's arrival."""
+        """Convert a time of the tablet's clock [ms] to the session's [s], counted back from the answer's arrival."""
         return arrival + self.session_offset - max(sent - tablet_time, 0.0) * 1e-3
 
 
 class SubjectSide(QObject):
-    """Brings the page, and the keyboard with it, when an answer is due, and lets both go when it is given."""
+    """Shows the page and gives it the keyboard when an answer is due, and takes both back afterwards."""
 
-    line_changed = Signal()  # another screen, a ruler, or a tablet that came, went or was measured
+    line_changed = Signal()  # the screen, a measured length or the tablet has changed
 
     def __init__(
         self,
@@ -118,7 +118,7 @@ class SubjectSide(QObject):
         course: CoursePanel,
         act: Callable[[str], None],
     ) -> None:
-        """Follow the subject's window, and a `tablet` where the subject answers there; `act` does what a key is for."""
+        """Follow the subject's window, and a `tablet` if one is used; `act` carries out the action of a key."""
         super().__init__(window)
         self._window, self._bridge, self._mirror = window, bridge, course.mirror
         self._subject, self._tablet = subject, tablet
@@ -131,39 +131,39 @@ class SubjectSide(QObject):
         application = QGuiApplication.instance()
         assert isinstance(application, QGuiApplication)
         for screens_changed in (application.screenAdded, application.screenRemoved):
-            screens_changed.connect(self._follow_screens, Qt.ConnectionType.QueuedConnection)  # once windows have moved
+            screens_changed.connect(self._follow_screens, Qt.ConnectionType.QueuedConnection)  # after window moves
         if tablet is not None:
             tablet.answered.connect(bridge.send)
             tablet.changed.connect(self.line_changed)
 
     def show(self) -> None:
-        """Show the subject's window, and let the keyboard go to it from whatever is being typed."""
+        """Show the subject's window, and move the keyboard to it even from a text being typed."""
         if self.keyboard.focused_field() is not None:
             self._window.setFocus()
         self._show_subject(activating=True)
-        self.show_view(self._bridge.view)  # which a window that is hidden need not have
+        self.show_view(self._bridge.view)  # a hidden window may be out of date
         self._subject.raise_()
         self._subject.activateWindow()
 
     def begin(self) -> None:
-        """Show the page on a second screen from the first step on; the keyboard stays where it is."""
+        """Show the page on a second screen from the first step on, without moving the keyboard."""
         if self._tablet is None and self._with_people():
             self._show_subject(activating=False)
 
     def show_view(self, view: View) -> None:
-        """Show what the subject sees now, small in the mirror too; bring the page for an answer that is due."""
+        """Update the subject's page and its mirror; show the page for an answer that is due."""
         session, subject = self._bridge.state.session, self._subject
         self._mirror.show_view(view.mirror, subject.size())
         if self._tablet is not None:
             self._tablet.session_offset = self._bridge.session_offset
             self._tablet.show_view(view.subject, session)
             if not subject.isVisible():
-                return  # no key here is an answer
+                return  # keys of this computer are not answers
         was_scoring = subject.scoring
         subject.show_view(view.subject, None if session is None else session.plan.answering_hand)
         if not was_scoring:
             self._bring()
-        elif not subject.scoring:  # the question was taken back
+        elif not subject.scoring:  # the question was withdrawn
             self._let_go()
 
     def show_force(self) -> None:
@@ -178,7 +178,7 @@ class SubjectSide(QObject):
         return line_settings(millimetres(screen)) if tablet is None else tablet.line_settings()
 
     def come_back(self) -> None:
-        """Let the keyboard come back to the experimenter's window, which has its screen to itself."""
+        """Return the keyboard to the experimenter's window, and clear its screen."""
         self._clear_screen()
         self._window.activateWindow()
 
@@ -187,7 +187,7 @@ class SubjectSide(QObject):
             self._clear_screen()
 
     def _clear_screen(self) -> None:
-        """Take the page from the experimenter's screen to a second one, where there is one."""
+        """Move the page from the experimenter's screen to a second one, if there is one."""
         if self._subject.screen() is self._window.screen():
             self._subject.hide()
             self.begin()
@@ -199,14 +199,14 @@ class SubjectSide(QObject):
         subject.setAttribute(Qt.WidgetAttribute.WA_ShowWithoutActivating, not activating)
         if elsewhere and not subject.isVisible():
             subject.setGeometry(elsewhere[0].availableGeometry())
-            subject.setWindowState(Qt.WindowState.WindowFullScreen)  # not showFullScreen: that takes the keyboard
+            subject.setWindowState(Qt.WindowState.WindowFullScreen)  # showFullScreen would take the keyboard
         elif not elsewhere and activating and subject.scoring:
             subject.setGeometry(self._window.geometry())
         if elsewhere or activating:
             subject.show()
 
     def _bring(self) -> None:
-        """Bring the subject's window for an answer that is due, and the keyboard unless somebody is typing."""
+        """Show the subject's window for an answer that is due, with the keyboard unless somebody is typing."""
         if not self._subject.scoring or not self._with_people():
             return
         active = QGuiApplication.applicationState() == Qt.ApplicationState.ApplicationActive
@@ -220,7 +220,7 @@ class SubjectSide(QObject):
         return session is not None and session.people != "simulated people"
 
     def _let_go(self) -> None:
-        """Give the keyboard back once no answer is due, unless it is another window's."""
+        """Return the keyboard when no answer is due, unless another window has it."""
         field = self.keyboard.focused_field()
         if field is None or field.window() is self._window:
             self.come_back()

@@ -1,4 +1,4 @@
-"""The subject's place: what to do, then the line. Nothing on it reveals which stimulus is mounted."""
+"""The subject's window: instructions, then the answer. It never reveals the mounted stimulus."""
 
 from collections.abc import Callable
 
@@ -16,22 +16,22 @@ from daq_app.wording import tr, typed_number
 from sessions.plan.plan import Hand
 from sessions.plan.protocols.protocol import ENGLISH
 
-_LARGE, LARGER = 24, 36  # type that is read from where a hand rests on a transducer
-SHRINKING = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)  # of it, until a page holds its texts
+_LARGE, LARGER = 24, 36  # type that is legible with a hand on the transducer
+SHRINKING = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)  # factors of the type, until the texts fit the page
 _WIDEST = 1100  # row of the button
 GIVING = (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space)
-TEXT_WIDTH = 900  # of a text that is still easily read, before the scale of the fonts
+TEXT_WIDTH = 900  # largest width of an easily read text, before the scale of the fonts
 
 
-NO_PAGE = SubjectView("read", "")  # before the first, and once an answer is given
+NO_PAGE = SubjectView("read", "")  # before the first page, and after an answer
 
 
 class SubjectWindow(QWidget):
-    """A window of its own, for a second screen or a tablet."""
+    """A separate window, for a second screen."""
 
     answered = Signal(object)  # Scored, MagnitudeEstimate or PairedChoice
     screen_changed = Signal()
-    closed = Signal()  # by somebody, not by the program
+    closed = Signal()  # by a person, not by the program
 
     def __init__(self, now: Callable[[], float]) -> None:
         super().__init__()
@@ -40,8 +40,8 @@ class SubjectWindow(QWidget):
         self.setWindowTitle("daq-app · subject")
         self.setAccessibleName("subject's window")
         self._view = NO_PAGE
-        self._answered: SubjectView | None = None  # until the recorder has the answer, views still ask for it
-        self.answer_key: int | None = None  # key by which the last answer was given; None: by a click or a touch
+        self._answered: SubjectView | None = None  # views repeat the question until the recorder has the answer
+        self.answer_key: int | None = None  # key that gave the last answer; None: a click or a touch
         self._stated_hand: Hand | None = None
         self._language = ENGLISH
         self._title, self._text = label(role="title", wrap=True), label(wrap=True)
@@ -56,7 +56,7 @@ class SubjectWindow(QWidget):
         self.next = button(Text.NEXT, Text.NEXT, self._give, "primary")
         self.next.setMinimumSize(px(180), px(64))
         self.ruler = RulerCheck()
-        self.ruler.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # its words are the experimenter's
+        self.ruler.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # its texts are the experimenter's
         self.ruler.finished.connect(self._screen_changed)
         self.ruler.finished.connect(self._turn)
         self._pages = stack_pages(self._message_page(), self._scale_page(), self.ruler)
@@ -77,7 +77,7 @@ class SubjectWindow(QWidget):
 
     @property
     def measuring(self) -> bool:
-        """Say whether the line is held against a ruler now."""
+        """Say whether the line is being measured with a ruler."""
         return self._pages.currentWidget() is self.ruler
 
     @property
@@ -85,7 +85,7 @@ class SubjectWindow(QWidget):
         return self.number if self.asks == "number" else self.choice if self.asks == "choice" else self.line
 
     def show_view(self, view: SubjectView, hand: Hand | None) -> None:
-        """Show what is to be done now; `hand` is the answering one, where somebody stated it."""
+        """Show a page; `hand` is the answering one, if stated."""
         if view == self._answered:
             return
         previous, self._view, self._stated_hand, self._answered = self._view, view, hand, None
@@ -109,7 +109,7 @@ class SubjectWindow(QWidget):
         self._fit_type()
 
     def _fit_type(self) -> None:
-        """Make the letters as large as they should be, or as small as lets all of the page be read."""
+        """Set the type to its normal size, or smaller until the whole page fits."""
         layout = self._answer_layout if self.scoring else self._message_layout
         for factor in SHRINKING:
             for widget in (self._title, self._question):
@@ -118,7 +118,7 @@ class SubjectWindow(QWidget):
                 _set_type(widget, _LARGE * factor)
             self._scale.set_type(_LARGE * factor)
             layout.invalidate()
-            layout.activate()  # a page that is not shown has not yet heard of its new texts
+            layout.activate()  # a hidden page has not yet processed its new texts
             if layout.totalHeightForWidth(self.width()) <= self.height():
                 return
 
@@ -154,12 +154,12 @@ class SubjectWindow(QWidget):
         self.activateWindow()
 
     def fit_screen(self) -> None:
-        """Make the line as long as it should be on the screen the window is on."""
+        """Set the line's length for the window's screen."""
         self.line.set_pixels_per_mm(millimetres(self.screen()).pixels)
         self._scale.fit()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Let Enter be Next, and every other key of the line go to the line."""
+        """Treat Enter as Next, and pass every other key of the answer to its field."""
         if self.scoring and not self.measuring and event.key() in GIVING:
             self.take_key(event)
         elif event.key() == Qt.Key.Key_F11:
@@ -168,7 +168,7 @@ class SubjectWindow(QWidget):
             super().keyPressEvent(event)
 
     def take_key(self, event: QKeyEvent) -> None:
-        """Take a key of the answer, in whichever window it was pressed."""
+        """Take a key of the answer, pressed in either window."""
         if event.key() in GIVING:
             self._give(event.key())
         else:
@@ -176,7 +176,7 @@ class SubjectWindow(QWidget):
 
     def showEvent(self, event: QShowEvent) -> None:
         """Follow the window to screens of another size from now on."""
-        # Not on a move: that event comes before the screen is the other one.
+        # Not on a move event, which comes before the change of screen.
         self.windowHandle().screenChanged.connect(self._screen_changed, Qt.ConnectionType.UniqueConnection)
         self._screen_changed()
 
@@ -190,7 +190,7 @@ class SubjectWindow(QWidget):
             self.fit_screen()
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Only hide: an answer that is being given is not lost."""
+        """Only hide, to keep an answer that is being given."""
         event.ignore()
         self.hide()
         self.closed.emit()
@@ -211,7 +211,7 @@ class SubjectWindow(QWidget):
         page = QWidget()
         for text_label in (self._question, self._hint):
             text_label.setAlignment(Qt.AlignmentFlag.AlignHCenter)
-        button_place = QWidget()  # keeps the button's place while there is none
+        button_place = QWidget()  # keeps the button's room while it is hidden
         self._next_row = hbox(1, self.next, on=button_place, margins=(4 * GRID, 0, 4 * GRID, 0))
         button_place.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # Next lies at a hand in every script
         button_place.setFixedHeight(self.next.minimumHeight() + 2 * GRID)
@@ -239,7 +239,7 @@ class SubjectWindow(QWidget):
             return
         self.answer_key = key
         answer_event = self._answer_field.answer_event(self._stated_hand)
-        self.next.hide()  # nobody gives an answer twice
+        self.next.hide()  # an answer is given only once
         self._view, self._answered = NO_PAGE, self._view
         set_text(self._title, translator(self._language)(Text.THANKS))
         set_text(self._text, "")
@@ -249,7 +249,7 @@ class SubjectWindow(QWidget):
 
 
 class _Scale(QWidget):
-    """The line with the words for its two ends, each under the end it is for."""
+    """The line with the labels of its two ends below them."""
 
     def __init__(self, line: ScoreLine) -> None:
         super().__init__()
@@ -259,7 +259,7 @@ class _Scale(QWidget):
         for text_label in self._labels:
             text_label.setParent(self)
             text_label.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
-            text_label.setMargin(GRID)  # keeps texts apart; Arabic letters reach beyond the height of the label's font
+            text_label.setMargin(GRID)  # separates texts; Arabic letters extend beyond the height of the label's font
 
     def show_texts(self, texts: tuple[str, str]) -> None:
         for widget, text in zip(self._labels, texts, strict=True):
@@ -272,7 +272,7 @@ class _Scale(QWidget):
         self.fit()
 
     def fit(self) -> None:
-        """Place the words: beside each other without touching, as wide as there is room."""
+        """Place the two labels in a row without contact, as wide as possible."""
         line = self._line
         line.move((self.width() - line.width()) // 2, 0)
         positions = [line.x() + line.point_at(position).x() for position in (0.0, 100.0)]
@@ -289,14 +289,14 @@ class _Scale(QWidget):
 
 
 class RulerCheck(QWidget):
-    """Shows a line, and takes what a ruler says of it."""
+    """Shows a line, and takes its length as measured with a ruler."""
 
     finished = Signal()
 
     def __init__(self) -> None:
         super().__init__()
         self._screen: QScreen | None = None
-        self._line = ScoreLine(lambda: 0.0)  # the very line on which is answered
+        self._line = ScoreLine(lambda: 0.0)  # the same widget as for answers
         self._line.setEnabled(False)
         self._line.setAccessibleName(tr("line of 100 millimetres to be measured"))
         sentence = label(tr("Hold a ruler to the line. How long is it?"), "title", wrap=True)
@@ -319,7 +319,7 @@ class RulerCheck(QWidget):
         set_text(self._wrong, tr("Screen: {name}, {words}.", name=screen_name, words=millimetres(screen).origin))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Let the Enter that keeps a length mean nothing else: the page behind would take it."""
+        """Consume the Enter that stores a length, which the page behind would take."""
         if event.key() not in GIVING:
             super().keyPressEvent(event)
 
@@ -336,11 +336,11 @@ class RulerCheck(QWidget):
 
 
 def _question_of(view: SubjectView) -> tuple[object, ...]:
-    """Return what an answer is to: with another of these it restarts."""
+    """Return the identity of a question; a change restarts the answer."""
     return view.kind, view.key, view.ends, view.ticks
 
 
 def _set_type(widget: QLabel, size: float, *, bold: bool = False) -> None:
-    """Set a label in large type: the style sheet's sizes are those of the experimenter's window."""
+    """Set a label in large type; the style sheet's sizes are for the experimenter's window."""
     widget.setStyleSheet(f"font-size: {px(size)}px; font-weight: {600 if bold else 400};")
     widget.setFont(font(round(size), bold=bold))

@@ -1,4 +1,4 @@
-"""Tables whose ranges are copied with Ctrl+C: of texts, sorted by a click on their head, and of raw readings."""
+"""Tables with Ctrl+C for ranges: texts, sorted by a click on a column heading, and raw readings."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -27,7 +27,7 @@ _COLUMNS = tr_noop(("window", "sequence", "counter", "status", "time [s]", "rece
 
 
 class CopyableTable(QTableView):
-    """A table that is read; Ctrl+C copies the selected range as tab-separated values."""
+    """A read-only table; Ctrl+C copies the selected range as tab-separated values."""
 
     def __init__(self, name: str) -> None:
         super().__init__()
@@ -43,7 +43,7 @@ class CopyableTable(QTableView):
             super().keyPressEvent(event)
 
     def selected_text(self) -> str:
-        """Return the least rectangle of cells that holds the selection; empty where a cell in it is not selected."""
+        """Return the bounding rectangle of the selected cells as text, with unselected cells empty."""
         cells = {(cell.row(), cell.column()): str(cell.data()) for cell in self.selectedIndexes()}
         if not cells:
             return ""
@@ -55,16 +55,16 @@ class CopyableTable(QTableView):
 
 
 class _ByNumber(QSortFilterProxyModel):
-    """Sorts numbers by their value, whatever stands after them."""
+    """Sorts numbers by their value, ignoring any text after them."""
 
     def lessThan(self, left: Index, right: Index) -> bool:
         return sort_key(str(left.data())) < sort_key(str(right.data()))
 
 
 class TextTable(CopyableTable):
-    """A table of texts: a click on a column's head sorts by it, and `row_chosen` says which line is current."""
+    """A table of texts: a click on a column heading sorts by it, and `row_chosen` carries the current line."""
 
-    row_chosen = Signal(int)  # its number before any sorting
+    row_chosen = Signal(int)  # line number before sorting
 
     def __init__(self, name: str, columns: Sequence[str]) -> None:
         super().__init__(name)
@@ -74,7 +74,7 @@ class TextTable(CopyableTable):
         self._sorter = _ByNumber(self)
         self._sorter.setSourceModel(self._cells)
         self.setModel(self._sorter)
-        self.horizontalHeader().setSortIndicator(-1, Qt.SortOrder.AscendingOrder)  # as the session has them
+        self.horizontalHeader().setSortIndicator(-1, Qt.SortOrder.AscendingOrder)  # the session's order
         self.setSortingEnabled(True)
         self.selectionModel().currentRowChanged.connect(self._row_changed)
 
@@ -93,7 +93,7 @@ class TextTable(CopyableTable):
                 self.go_to(current, max(now.column(), 0))
 
     def go_to(self, line: int, column: int = 0) -> None:
-        """Stand at a cell of a line, which is numbered as before any sorting."""
+        """Go to a cell of a line, which is numbered as before sorting."""
         self.setCurrentIndex(self._sorter.mapFromSource(self._cells.index(line, column)))
 
     def _row_changed(self, now: QModelIndex, _previous: QModelIndex) -> None:
@@ -102,7 +102,7 @@ class TextTable(CopyableTable):
 
 
 def _is_of_numbers(column: Sequence[str]) -> bool:
-    """Say whether every cell is a number: beside a long text one at the right edge of its column is out of sight."""
+    """Say whether a column has only numbers, to be right-aligned: among long texts that would put them out of sight."""
     return all(number_in(text) is not None or text in ("", "–") for text in column)
 
 
@@ -114,19 +114,19 @@ def _item(text: str, right: bool) -> QStandardItem:
 
 
 class ReadingsTable(QWidget):
-    """A table with the place of its numbers above it."""
+    """A table of readings, with their location in the file above it."""
 
     def __init__(self) -> None:
         super().__init__()
         self.caption = WrappedLabel("quiet")
-        self.table = CopyableTable(tr("raw readings"))  # in the order in which they came
+        self.table = CopyableTable(tr("raw readings"))  # in order of arrival
         self.table.setSelectionBehavior(QTableView.SelectionBehavior.SelectRows)
         self._model = _Model()
         self.table.setModel(self._model)
         vbox(self.caption, (self.table, 1), on=self, margins=GRID)
 
     def show_readings(self, readings: RawReadings | None, steady: tuple[float, float] | None) -> None:
-        """Show readings, those of the steady window marked by a word and by bold type."""
+        """Show readings, with those of the steady window marked by a word and by bold type."""
         self._model.show_readings(readings, steady)
         self._fit_columns()
         text = tr("Not read yet.")
@@ -138,17 +138,17 @@ class ReadingsTable(QWidget):
         self.caption.show_text(text)
 
     def _fit_columns(self) -> None:
-        """Make each column as wide as its head and a few of its lines need: there may be a hundred thousand."""
+        """Fit each column to its heading and a few of its lines, of which there may be a hundred thousand."""
         model, count = self._model, self._model.rowCount()
         metrics, heads = self.table.fontMetrics(), self.table.horizontalHeader().fontMetrics()
         for column in range(model.columnCount()):
             title_width = heads.horizontalAdvance(str(model.headerData(column, Qt.Orientation.Horizontal)))
             texts = [model.index(row, column).data() for row in (0, count // 2, count - 1) if 0 <= row < count]
             widest = max(title_width, *(metrics.horizontalAdvance(str(text)) for text in texts), 0)
-            self.table.setColumnWidth(column, round(1.15 * widest) + 2 * GRID)  # steady ones are bold
+            self.table.setColumnWidth(column, round(1.15 * widest) + 2 * GRID)  # steady readings are bold
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Fit the columns to the type, which is known by now."""
+        """Fit the columns to the font, which is set by now."""
         self._fit_columns()
 
     def go_to(self, row: int) -> None:
@@ -158,7 +158,7 @@ class ReadingsTable(QWidget):
 
 
 class _Model(QAbstractTableModel):
-    """Readings as a table, read only where they are shown."""
+    """Readings as a table model, read only where visible."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -186,7 +186,7 @@ class _Model(QAbstractTableModel):
             return tr(_COLUMNS[section])
         return tr("raw {channel}", channel=channel) if channel <= 6 else ("N [N]", "T [N]")[channel - 7]
 
-    def data(self, index: Index, role: int = 0) -> Any:  # noqa: ANN401  whatever a role asks for
+    def data(self, index: Index, role: int = 0) -> Any:  # noqa: ANN401  the type depends on the role
         readings = self._readings
         if readings is None:
             return None
@@ -208,7 +208,7 @@ class _Model(QAbstractTableModel):
 
 
 def number_in(text: str) -> float | None:
-    """Return the number with which a text begins; None where it begins with none.
+    """Return the number at the beginning of a text, or None.
 
     >>> number_in("0.440 to 0.453"), number_in("−3.5 %"), number_in("–"), number_in("stroke 3")
     (0.44, -3.5, None, None)
@@ -218,7 +218,7 @@ def number_in(text: str) -> float | None:
 
 
 def sort_key(text: str) -> tuple[bool, float, str]:
-    """Return what a cell is sorted by: numbers by their value, then words.
+    """Return the sort key of a cell: numbers by value, then words.
 
     >>> sorted(["10", "9.5", "–", "−1"], key=sort_key)
     ['−1', '9.5', '10', '–']
@@ -228,7 +228,7 @@ def sort_key(text: str) -> tuple[bool, float, str]:
 
 
 def as_tsv(lines: Iterable[Iterable[str]]) -> str:
-    r"""Return cells as tab-separated values; a tab or a new line within a cell becomes a space.
+    r"""Return cells as tab-separated values; a tab or a newline within a cell becomes a space.
 
     >>> as_tsv([["a", "b\tc"], ["1", "2"]])
     'a\tb c\n1\t2'

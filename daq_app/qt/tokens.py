@@ -1,4 +1,4 @@
-"""Colours, sizes and type of the window: one set of tokens for light and dark, and the style sheet made of it."""
+"""Colours, sizes and type of the window: a set of tokens each for light and dark, and their style sheet."""
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
@@ -13,12 +13,12 @@ from PySide6.QtWidgets import QWidget
 
 from daq_app.qt.preferences import theme, type_scale
 
-GRID = 8  # everything keeps to multiples of it [device-independent pixels]
-TARGET = 40  # least height of what is clicked or touched
+GRID = 8  # sizes are multiples of it [device-independent pixels]
+TARGET = 40  # least height of clickable parts
 SMALL, TEXT, TITLE, HEADLINE = 13, 15, 20, 32  # type, before its scale
-STYLE = Path(__file__).with_name("style.qss")  # names of tokens and sizes stand after a $
+STYLE = Path(__file__).with_name("style.qss")  # refers to tokens and sizes by $name
 
-# Okabe and Ito's palette, distinct with every common colour blindness.
+# Okabe and Ito's palette, distinguishable with all common colour blindnesses.
 FX, FY, N, T, MU, MODEL = "#0072B2", "#E69F00", "#56B4E9", "#D55E00", "#CC79A7", "#009E73"
 
 
@@ -29,14 +29,14 @@ class Tokens:
     dark: bool
     ground: str  # of the window
     surface: str  # of panels
-    raised: str  # of what can be pressed
+    raised: str  # of pressable parts
     line: str
     text: str
     quiet: str  # labels, axes
     act: str  # the primary button, the focus ring
     on_act: str
     wrong: str  # data are being lost or are wrong
-    look: str  # look here
+    look: str  # attention
     record: str  # the recording lamp
 
 
@@ -51,7 +51,7 @@ DARK = Tokens(
 
 
 def preferred_tokens() -> Tokens:
-    """Return the tokens of the theme that was chosen, or of the one that the system asks for."""
+    """Return the tokens of the chosen theme, or of the system's."""
     if (name := theme()) != "system":
         return DARK if name == "dark" else LIGHT
     scheme = QGuiApplication.styleHints().colorScheme()
@@ -61,17 +61,17 @@ def preferred_tokens() -> Tokens:
 
 
 def theme_of(widget: QWidget) -> Tokens:
-    """Return the theme in which a widget is shown: light text stands on dark grounds."""
+    """Return the theme of a widget: light text means the dark theme."""
     return DARK if widget.palette().windowText().color().lightness() > 127 else LIGHT
 
 
 def px(length: float, most: float = inf) -> int:
-    """Return a length that grows with the type, but no more than `most` times [px]."""
+    """Return a length scaled with the type, at most `most` times [px]."""
     return round(length * min(type_scale(), most))
 
 
 def font(size: float, *, bold: bool = False) -> QFont:
-    """Return the window's type at a size, with figures that all have the same width."""
+    """Return the window's font at a size, with figures of equal width."""
     typeface = QFont(QGuiApplication.font())
     typeface.setPixelSize(px(size))
     typeface.setFeature(QFont.Tag.fromString("tnum"), 1)
@@ -81,7 +81,7 @@ def font(size: float, *, bold: bool = False) -> QFont:
 
 
 def palette(t: Tokens) -> QPalette:
-    """Return the palette for what the style draws by itself: radio buttons, arrows of lists, focus."""
+    """Return the palette for parts that the style draws itself: radio buttons, arrows of lists, focus."""
     colours = QPalette()
     role = QPalette.ColorRole
     for colour, *names in (
@@ -102,14 +102,14 @@ def palette(t: Tokens) -> QPalette:
 
 
 def tick_palette(t: Tokens) -> QPalette:
-    """Return the palette of boxes to tick: the style draws their outline in a darker shade of the window's ground."""
+    """Return the palette of check boxes: the style draws their outline in a darker shade of the background."""
     colours = palette(t)
     colours.setColor(QPalette.ColorRole.Window, QColor(t.quiet))
     return colours
 
 
 def style_sheet(t: Tokens) -> str:
-    """Return the style sheet of every widget of the window; a button is at least as high as a line of its type."""
+    """Return the style sheet of the window; a button is at least as high as a line of its type."""
     sizes = {"small": SMALL, "text": TEXT, "title": TITLE, "headline": HEADLINE}
     lengths = {f"px_{name}": px(size) for name, size in sizes.items()}
     tall = (("button", TEXT, TARGET - 10), ("primary", TITLE, TARGET))
@@ -119,7 +119,7 @@ def style_sheet(t: Tokens) -> str:
 
 
 def missing_glyphs(texts: Iterable[str], font: QFont) -> str:
-    """Return the characters of texts, each once, that neither the font nor one that stands in for it can draw."""
+    """Return the characters of texts, each once, that neither the font nor a fallback font has."""
     metrics, characters = QFontMetrics(font), set(normalize("NFC", "".join(texts)))
     printed = (letter for letter in sorted(characters) if not letter.isspace() and category(letter) != "Cf")
     return "".join(letter for letter in printed if not metrics.inFontUcs4(ord(letter)))

@@ -12,17 +12,17 @@ from daq_app.qt.tokens import GRID, TARGET
 from daq_app.wording import tr
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
-_TICK = 33  # between two pictures while it plays [ms]
+_TICK = 33  # between two pictures during playback [ms]
 
 
 class TransportBar(QWidget):
-    """Moves through instants; `moved` carries the position of the one that is shown."""
+    """Moves through a sequence of times; `moved` carries the index of the current one."""
 
     moved = Signal(int)
     ended = Signal()
 
     def __init__(self, name: str, *, tells_time: bool = True) -> None:
-        """Offer to play `name`, which is not there yet; without `tells_time` the instants are no times of it."""
+        """Offer to play `name`, not yet loaded; without `tells_time` the sequence is not shown as times."""
         super().__init__()
         self._name = name
         self._times: Sequence[float] = ()
@@ -44,7 +44,7 @@ class TransportBar(QWidget):
         self.time_label = label("", "quiet")
         self.time_label.setVisible(tells_time)
         hbox(self.play, self.back, self.forward, (self.slider, 1), self.time_label, self.speed, on=self, spacing=GRID)
-        self._line = QTimeLine(parent=self)  # from the first instant to the last, at the chosen speed
+        self._line = QTimeLine(parent=self)  # from the first time to the last, at the chosen speed
         self._line.setEasingCurve(QEasingCurve.Type.Linear)
         self._line.setUpdateInterval(_TICK)
         self._line.valueChanged.connect(lambda: self._show(self._time))
@@ -57,7 +57,7 @@ class TransportBar(QWidget):
         return self._line.state() == QTimeLine.State.Running
 
     def set_times(self, times: Sequence[float]) -> None:
-        """Take the instants [s], rising, and stand at the last; none of them: nothing can be played."""
+        """Set the times [s], ascending, and go to the last; without any, nothing can be played."""
         self._times = times
         self._line.stop()
         with QSignalBlocker(self.slider):
@@ -80,7 +80,7 @@ class TransportBar(QWidget):
         self._enable()
 
     def step(self, count: int) -> None:
-        """Go some instants on or back; what plays is paused."""
+        """Pause, and move by `count` times forward or back."""
         if len(self._times):
             if self.playing:
                 self.toggle()
@@ -106,17 +106,17 @@ class TransportBar(QWidget):
 
     @property
     def _time(self) -> float:
-        """Where the time line is among the instants [s]."""
+        """Return the position of the time line [s]."""
         first, last = (self._times[0], self._times[-1]) if len(self._times) else (0.0, 0.0)
         return first + self._line.currentValue() * (last - first)
 
     def _set_time(self, time: float) -> None:
-        """Put the time line at a place [s], at the chosen speed; where it ran it goes on from there."""
+        """Set the time line to a position [s], at the chosen speed; if it was running it continues from there."""
         if not len(self._times):
             return
         playing, first, last = self.playing, self._times[0], self._times[-1]
         per_second = 1000.0 / SPEEDS[self.speed.currentIndex()]
-        with QSignalBlocker(self._line):  # the place is shown by whoever asks for it, exact to a reading
+        with QSignalBlocker(self._line):  # callers show the position, exact to a reading
             self._line.stop()
             self._line.setDuration(max(round(per_second * (last - first)), 1))
             self._line.setCurrentTime(round(per_second * (time - first)))
