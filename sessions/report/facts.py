@@ -189,13 +189,17 @@ def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
 def _tilt(analysis: Analysis) -> tuple[str, str]:
     """Return the tilt of the face, "" where unknown, and whether it was levelled."""
     tilt, x_y = analysis.tilt, analysis.settings.tilt
-    levelling = "not levelled" if x_y == (0.0, 0.0) else f"levelled by {x_y[0]:.2g}° and {x_y[1]:.2g}°"
+    levelling = "not levelled" if x_y == (0.0, 0.0) else f"levelled by {_angle(x_y[0])}° and {_angle(x_y[1])}°"
     if tilt is None:
-        return ("" if x_y == (0.0, 0.0) else f"{x_y[0]:.2g}° to +x and {x_y[1]:.2g}° to +y"), levelling
+        return ("" if x_y == (0.0, 0.0) else f"{_angle(x_y[0])}° to +x and {_angle(x_y[1])}° to +y"), levelling
     (low_x, high_x), (low_y, high_y) = tilt.x_interval, tilt.y_interval
-    along = f"{tilt.lean[0]:.2g}° ({low_x:.2g} to {high_x:.2g}) to +x"
-    across = f"{tilt.lean[1]:.2g}° ({low_y:.2g} to {high_y:.2g}) to +y"
+    along = f"{_angle(tilt.lean[0])}° ({_angle(low_x)} to {_angle(high_x)}) to +x"
+    across = f"{_angle(tilt.lean[1])}° ({_angle(low_y)} to {_angle(high_y)}) to +y"
     return f"{along}, {across}", f"{tilt.kind}; {levelling}"
+
+
+def _angle(degrees: float) -> str:
+    return f"{degrees:.2g}".replace("-", "−")
 
 
 def exclusion_sentences(recording: Recording, analysis: Analysis, strokes: Sequence[StrokeFinding]) -> tuple[str, ...]:

@@ -137,7 +137,7 @@ def test_a_lean_from_three_presses_is_drawn_from_students_law():
     assert np.degrees(ends) == pytest.approx([-4.303, 4.303], rel=0.03)  # of two degrees of freedom (Student 1908)
 
 
-@pytest.mark.parametrize(("levelled", "sentence"), [((0.0, 0.0), "not levelled"), (LEAN, "levelled by 2° and -1.2°")])
+@pytest.mark.parametrize(("levelled", "sentence"), [((0.0, 0.0), "not levelled"), (LEAN, "levelled by 2° and −1.2°")])
 def test_the_report_tells_the_lean_of_the_face_with_students_interval(levelled, sentence):
     settings = replace(SETTINGS, tilt=levelled)
     analysis = analyse(block(T, noisy(lean_wrench(presses((0.03, -0.02, 0.0))))), settings=settings)
@@ -148,7 +148,7 @@ def test_the_report_tells_the_lean_of_the_face_with_students_interval(levelled, 
     x, y = (
         f"{lean:.2g}° ({low:.2g} to {high:.2g})" for lean, (low, high) in zip(leans.mean(axis=0), limits, strict=True)
     )
-    assert fact.value == f"{x} to +x, {y} to +y"
+    assert fact.value == f"{x} to +x, {y} to +y".replace("-", "−")
     assert fact.remark == f"95 % t interval of the mean of 3 presses; {sentence}"
 
 
@@ -156,4 +156,4 @@ def test_the_report_tells_a_lean_that_a_person_gave():
     analysis = analyse(block(T, noisy(slide(T))), settings=replace(SETTINGS, tilt=LEAN))
     recording = SimpleNamespace(info=INFO, plan=plan(), provenance={})
     fact = next(fact for fact in apparatus(recording, analysis) if fact.name == "tilt of the face")
-    assert (fact.value, fact.remark) == ("2° to +x and -1.2° to +y", "levelled by 2° and -1.2°")
+    assert (fact.value, fact.remark) == ("2° to +x and −1.2° to +y", "levelled by 2° and −1.2°")

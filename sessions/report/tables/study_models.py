@@ -135,7 +135,7 @@ def trials_table(study: StudyFindings) -> Table | None:
     if sum(len(visit.rows) for visit in study.visits) > _MOST_TRIALS:
         return None
     columns = (
-        "trial | index | score [0–100] | µ [1] | τ max [kPa] | N [N] | speed [mm/s] | SED [kPa] | "
+        "trial | index | score [0–100] or number | µ [1] | τ max [kPa] | N [N] | speed [mm/s] | SED [kPa] | "
         "estimated error [%] | flaws"
     )
     groups = [
