@@ -23,6 +23,7 @@ from drivers.arrays import Array
 from sessions.file_access import json_object
 from sessions.prediction.surface_series import SERIES, Press, series_slopes
 from sessions.recording.head import software_versions
+from sessions.statistics.correlations import share_interval
 from solver import Friction, Loading, Receptor, Scene, Solve
 
 Kinematics = Literal["small", "finite"]
@@ -213,20 +214,9 @@ def _signs(answer: Answer) -> Array:
 
 
 def share(outcomes: Array) -> tuple[float, float, float] | None:
-    """Return the share of ones among numbers (n,) without nan, with its 95 % interval; None if there are none.
-
-    The interval is that of Wilson (1927, J. Am. Stat. Assoc. 22, 209).
-
-    >>> [round(number, 3) for number in share(np.array([1.0] * 4 + [0.0] * 9)) or ()]
-    [0.308, 0.127, 0.576]
-    """
-    from scipy import stats  # slow to load
-
+    """Return the share of ones among numbers (n,), nan left out, with its 95 % interval; None without numbers."""
     finite = outcomes[np.isfinite(outcomes)]
-    if not len(finite):
-        return None
-    interval = stats.binomtest(int(finite.sum()), len(finite)).proportion_ci(method="wilson")
-    return float(finite.mean()), float(interval.low), float(interval.high)
+    return (mean := float(finite.mean()), *share_interval(mean, len(finite))) if len(finite) else None
 
 
 def shares_by_thirds(outcomes: Array, values: Array) -> list[tuple[float, float, float | None]]:

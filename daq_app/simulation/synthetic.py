@@ -304,18 +304,19 @@ def population_relations(
 def relations(people: SubjectSettings, seds: SedsAt) -> dict[str, dict[str, float]]:
     """Return r and slope of single scores on SED for each descriptor whose surfaces all have full slip.
 
-    r includes the noise of judgement [-]; the slope [points per kPa] is adjusted for drift and carry-over.
+    r pools all trials within people and includes the noise of judgement [-]. The slope is the mean of people's own
+    slopes, without drift and carry-over [points per kPa]: a mixed model with random slopes estimates that mean.
     """
     by_descriptor: dict[str, dict[str, float]] = {}
     for block in plan(protocol(PROTOCOL), "S00", 0).blocks:
         surfaces = [simulated_surface(trial) for trial in block.trials]
-        seds_of_finger = _seds_of_fingers(surfaces, block, people.moisture, seds)
+        seds_of_finger = seds_of_fingers(surfaces, block, people.moisture, seds)
         if seds_of_finger is not None:
             by_descriptor[surfaces[0].descriptor] = _relation(people, surfaces, seds_of_finger)
     return by_descriptor
 
 
-def _seds_of_fingers(
+def seds_of_fingers(
     surfaces: Sequence[Surface], block: Block, moisture: float, seds: SedsAt
 ) -> Callable[[float], Sequence[float]] | None:
     """Return a function from a finger's relative friction to the SED [kPa] of each surface; None without full slip."""
@@ -338,22 +339,22 @@ def _seds_of_fingers(
 def _relation(
     people: SubjectSettings, surfaces: Sequence[Surface], seds: Callable[[float], Sequence[float]]
 ) -> dict[str, float]:
-    products = np.zeros((4, 4))  # of SED, position, previous index and score, each minus the person's mean
-    draw, indices = np.random.default_rng(0), [surface.index for surface in surfaces]
+    products = np.zeros((2, 2))  # of SED and score, each without the person's own mean
+    slopes: list[float] = []  # of each person
+    draw = np.random.default_rng(0)
     for seed in range(_FIRST, _FIRST + SAMPLE_SIZE):
         person = SimulatedSubject(seed, people)
-        order: list[int] = draw.permutation(len(surfaces)).tolist()
         perceived = [person.perceived_surface(surface) for surface in surfaces]
-        own_seds = seds(perceived[0].mu / surfaces[0].mu)
-        previous_indices: list[int | None] = [None, *(indices[i] for i in order[:-1])]
-        rows = np.array(
-            [
-                (own_seds[i], place, 0 if last is None else last - 50, person.expected_score(perceived[i], place, last))
-                for place, (i, last) in enumerate(zip(order, previous_indices, strict=True))
-            ]
-        )
-        rows -= rows.mean(axis=0)
-        products += rows.T @ rows
+        order: list[int] = draw.permutation(len(surfaces)).tolist()
+        previous_indices: list[int | None] = [None, *(surfaces[i].index for i in order[:-1])]
+        scores = np.empty(len(surfaces))
+        for place, (i, last) in enumerate(zip(order, previous_indices, strict=True)):
+            scores[i] = person.expected_score(perceived[i], place, last)
+        rows = np.array([seds(perceived[0].mu / surfaces[0].mu), scores])
+        rows -= rows.mean(axis=1, keepdims=True)
+        products += rows @ rows.T
+        by_surface = np.array([person.expected_score(surface) for surface in perceived])
+        slopes.append(float(rows[0] @ by_surface / (rows[0] @ rows[0])))
     noise = people.judgement_noise**2 * SAMPLE_SIZE * (len(surfaces) - 1)
-    r = products[0, 3] / math.sqrt(products[0, 0] * (products[3, 3] + noise))
-    return {"r": float(r), "slope": float(np.linalg.solve(products[:3, :3], products[:3, 3])[0])}
+    r = products[0, 1] / math.sqrt(products[0, 0] * (products[1, 1] + noise))
+    return {"r": float(r), "slope": float(np.mean(slopes))}

@@ -117,6 +117,18 @@ def fisher_interval(r: float, n: int, inflation: float = 1.0) -> tuple[float | N
     return math.tanh(math.atanh(r) - half), math.tanh(math.atanh(r) + half)
 
 
+def share_interval(share: float, cases: int) -> tuple[float, float]:
+    """Return the 95 % interval of a share of cases (Wilson 1927, J. Am. Stat. Assoc. 22:209, by the score test).
+
+    >>> [round(end, 3) for end in share_interval(4 / 13, 13)]
+    [0.127, 0.576]
+    """
+    square = t_quantile(math.inf) ** 2 / cases
+    middle = (share + square / 2) / (1 + square)
+    half = math.sqrt(square * (share * (1 - share) + square / 4)) / (1 + square)
+    return max(middle - half, 0.0), min(middle + half, 1.0)
+
+
 def _varies(values: Sequence[float]) -> bool:
     """Say whether values differ by more than round-off."""
     return float(np.ptp(values)) > 1e-12 * float(np.max(np.abs(values)))

@@ -25,7 +25,7 @@ MU_RANGE = (0.24, 0.67)  # least and greatest µ of the published surfaces
 
 @dataclass(frozen=True, slots=True)
 class AssumedEffects:
-    """Effect and spreads of simulated scores. The defaults are not measured; a pilot's mixed model gives values."""
+    """Effect and spreads of simulated scores. We chose the defaults; a pilot's mixed model gives measured ones."""
 
     effect: float = 20.0  # of the mean score, from the least to the greatest µ or other quantity [0–100]
     noise: float = 12.0  # standard deviation of a score about its subject's line [0–100]
@@ -48,11 +48,6 @@ class Power:
     def share(self) -> float:
         """The power [-]."""
         return self.detections / self.studies
-
-    @property
-    def half(self) -> float:
-        """Half-width of the 95 % interval of the power, for the number of studies [-]."""
-        return 1.96 * math.sqrt(max(self.share * (1.0 - self.share), 0.25 / self.studies) / self.studies)
 
 
 def power(

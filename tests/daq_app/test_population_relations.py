@@ -43,5 +43,15 @@ def test_fingers_gains_drift_and_carry_over_leave_the_slope_where_it_is():
     )
 
 
+def test_where_the_sed_bends_the_slope_is_the_mean_of_the_slopes_that_people_have():
+    # With an SED of RISE µ², a finger of f times the friction has f times the scores but f² times the SEDs. Its slope
+    # goes with 1 / f, whose mean over a log-normal f is exp(sd² / 2). All trials pooled would give exp(-3.5 sd²).
+    sd, mus = 0.2, np.array([s.mu for (name, _), s in paper_surfaces().items() if name == "stickiness"])
+    people = SubjectSettings(gain=GAIN, gain_spread=0.0, friction_weight=1.0, moisture=sd, drift=0.4, carry_over=0.04)
+    slope = relations(people, lambda loads: [1e-3 * RISE * mu**2 for mu, *_ in loads])["stickiness"]["slope"]
+    usual = GAIN * 100.0 / (STICKIEST - SLIPPERIEST) * np.cov(mus, mus**2)[0, 1] / np.var(mus**2, ddof=1) / RISE
+    assert slope == pytest.approx(usual * math.exp(sd**2 / 2), rel=0.03)
+
+
 def test_a_surface_without_a_settled_slide_leaves_nothing_to_hold_a_study_against():
     assert relations(SubjectSettings(), lambda loads: [None] * len(loads)) == {}

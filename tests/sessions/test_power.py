@@ -7,7 +7,8 @@ import pytest
 from scipy import stats
 
 from daq_app.cli.main import run
-from sessions.statistics.power import MU_RANGE, AssumedEffects, Power, power
+from sessions.statistics.correlations import share_interval
+from sessions.statistics.power import MU_RANGE, AssumedEffects, power
 
 PLAIN = AssumedEffects(effect=10.0, noise=12.0, level_sd=12.0, slope_sd=0.0, friction_sd=0.0)
 
@@ -27,15 +28,17 @@ def test_without_an_effect_the_test_detects_one_in_about_five_of_a_hundred():
     assert 0.02 <= (design.detections + design.wrong) / design.studies <= 0.08
 
 
-def test_the_error_of_a_power_is_that_of_a_share_of_so_many_studies():
-    assert Power(8, 5, detections=20, wrong=0, studies=100).half == pytest.approx(1.96 * 0.04)  # sqrt(0.2 0.8 / 100)
+@pytest.mark.parametrize(("ones", "cases"), [(0, 7), (4, 13), (348, 400), (400, 400), (1, 1)])
+def test_the_interval_of_a_share_is_scipy_s_by_wilson(ones, cases):
+    wilson = stats.binomtest(ones, cases).proportion_ci(method="wilson")
+    assert share_interval(ones / cases, cases) == pytest.approx((wilson.low, wilson.high), abs=1e-12)
 
 
 def test_more_subjects_find_more_and_spread_people_less():
     few, many = power(AssumedEffects(), (4, 12), (5,), 150, 3)
-    assert few.share + few.half < many.share
+    assert share_interval(few.share, 150)[1] < many.share
     (spread,) = power(AssumedEffects(slope_sd=2.0), (12,), (5,), 150, 3)
-    assert spread.share + spread.half < many.share
+    assert share_interval(spread.share, 150)[1] < many.share
 
 
 def test_the_verb_prints_a_table_and_refuses_nonsense(capsys, monkeypatch):
@@ -46,7 +49,7 @@ def test_the_verb_prints_a_table_and_refuses_nonsense(capsys, monkeypatch):
     assert document["planted"]["effect"] == 30.0
     assert [(design["subjects"], design["surfaces"]) for design in document["designs"]] == [(4, 3)]
     assert run(["study", "--power", "--studies", "20"]) == 0
-    assert "The usual values are not measured." in capsys.readouterr().out
+    assert "We chose the default values; nobody measured them." in capsys.readouterr().out
     for wrong in (["effect"], ["effect=1000"], ["toe=1"], ["--studies", "2"], ["--seed", "-1"]):
         assert run(["study", "--power", *wrong]) == 2
         assert capsys.readouterr().err.startswith("daq-app: ")

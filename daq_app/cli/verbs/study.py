@@ -35,6 +35,7 @@ from sessions.prediction import BY_NAME, SED, PredictionOptions
 from sessions.prediction.surface_series import StudyDesign, simulated_strokes
 from sessions.recording import RecordingError
 from sessions.recording.derived import session_folders
+from sessions.statistics.correlations import share_interval
 from sessions.statistics.findings import GROUND_TRUTH_FILE, UNITS, StudyFindings, check_ground_truth
 from sessions.statistics.pooled import pool_visits
 from sessions.statistics.power import TWIN, AssumedEffects, Recovery, power, recovery
@@ -71,11 +72,11 @@ def print_power(options: argparse.Namespace, console: Console) -> int:
     designs = [{**asdict(row), "power": row.share} for row in powers]
     console.result({"planted": asdict(effects), "designs": designs, "recovery": msgspec.to_builtins(recoveries)})
     rows = [
-        [str(count), *(f"{100 * row.share:.0f} ± {100 * row.half:.0f} %" for row in powers if row.subjects == count)]
+        [str(count), *(_share_text(row.share, row.studies) for row in powers if row.subjects == count)]
         for count in _SUBJECTS
     ]
     values = ", ".join(f"{name} = {value:g}" for name, value in asdict(effects).items())
-    console.say(f"Assumed: {values}. The usual values are not measured.")
+    console.say(f"Assumed: {values}. We chose the default values; nobody measured them.")
     console.say(table(rows, header=["subjects", *(f"{count} surfaces" for count in SURFACES)]))
     console.say(
         "Share of simulated studies whose correlation within subjects has p < 0.05 for other people on the same "
@@ -112,7 +113,7 @@ def _print_recovery(recoveries: Sequence[Recovery], options: argparse.Namespace,
     rows = [
         [
             f"{design.people} × {design.surfaces} × {len(design.depths)}",
-            *(f"{100 * share:.0f} %" for share in (design.preferred, design.family)),
+            *(_share_text(share, design.studies) for share in (design.preferred, design.family)),
         ]
         for design in recoveries
     ]
@@ -123,6 +124,16 @@ def _print_recovery(recoveries: Sequence[Recovery], options: argparse.Namespace,
         f"twins in the last row, by r of at least {TWIN:g}: {twins}. The finger is the published one, so real studies "
         "tell less."
     )
+
+
+def _share_text(share: float, studies: int) -> str:
+    """Return a share of simulated studies with its 95 % interval.
+
+    >>> _share_text(1.0, 400)
+    '100 % (99 to 100)'
+    """
+    low, high = share_interval(share, studies)
+    return f"{100 * share:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
 
 
 def _assumed_effects(texts: Sequence[str]) -> AssumedEffects:
