@@ -141,9 +141,9 @@ class ClockRecovery:
 
     Records follow each other at a steady rate, known within a few per cent. Their times advance at that rate and slowly
     follow the session's clock, so that bytes delivered in lumps do not shake them. A loss with broken bytes is counted
-    from those. A loss without a trace shows as a pause that no lump of records makes up for; below GAP it stays
-    unnoticed in the numbers, while times recover within seconds. A changed rate is followed (`RateWatch`); losses
-    counted before that remain.
+    from those. A loss without broken bytes appears as a pause that the next records do not make up for. Below GAP the
+    numbers do not show it, but times recover within seconds. A changed rate is followed (`RateWatch`); losses counted
+    before that remain.
     """
 
     def __init__(self, rate: float, factor: float = 1.0) -> None:

@@ -89,8 +89,8 @@ class BinaryDecoder:
 
     Of all divisions of the bytes into records, with few breaks, the one is chosen whose error bytes are digits and
     whose values best continue the last reading. A break means lost bytes: these and the adjacent records count as
-    broken. This is no proof: in a trial at rest, 5 of 100 randomly torn records left a wrong reading, and changed
-    bytes, or a loss of exactly one record's bytes, are invisible. On a line that loses bytes, text output is safer.
+    broken. This is no proof: in a trial at rest, 5 of 100 randomly torn records left a wrong reading. Changed bytes,
+    or a loss of exactly one record's bytes, are invisible. On a line that loses bytes, text output is safer.
     """
 
     def __init__(self) -> None:

@@ -1,8 +1,8 @@
 """A session as a data set of the Brain Imaging Data Structure: behaviour, events, forces and derived tables.
 
-Behavioural experiments (`beh`) as BIDS 1.10 describes them. Forces and torques have no data type of their own there
-yet, so the readings are a continuous recording (`physio`), one file for each stretch without a break. A reading that
-never arrived is a row of n/a, so that row and sampling rate agree. The last column says whether data are simulated.
+Behavioural experiments (`beh`) follow BIDS 1.10. It has no data type for forces and torques yet, so the readings are a
+continuous recording (`physio`), one file for each stretch without a break. A reading that never arrived is a row of
+n/a, so that row and sampling rate agree. The last column says whether data are simulated.
 """
 
 import gzip

@@ -86,9 +86,9 @@ def pairs_with(
 ) -> tuple[tuple[Item, Item], ...]:
     """Pair each item once with the standard, in a random order; over two repetitions it is first once.
 
-    Repetitions count from 1. Of repetitions 2 k - 1 and 2 k, the former has those items first that `shuffle` puts into
-    the first half for "name/first/k", and the latter the rest. Pairs come in the order of `shuffle` for `name` in
-    repetition 1, and for "name#repetition" after it.
+    Repetitions count from 1. Repetition 2 k - 1 has those items first that `shuffle` puts into the first half for
+    "name/first/k"; repetition 2 k has the others first. Pairs come in the order of `shuffle` for `name` in repetition
+    1, and for "name#repetition" after it.
     """
     leaders = shuffle(items, seed, f"{name}/first/{(repetition + 1) // 2}")[: len(items) // 2]
     order = shuffle(items, seed, name if repetition == 1 else f"{name}#{repetition}")

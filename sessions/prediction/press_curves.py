@@ -78,7 +78,7 @@ def press_curves(recording: Recording, log: DisplacementLog, settings: AnalysisS
 
 
 def _loading(curve: StrokeCurve, onset: float, times: Array, displacement: Array, width: Array) -> LoadingCurve | str:
-    """Return the loading of a press from a log with rows at `times` (n,) [s]; or why there is none."""
+    """Return the loading of a press from a log with rows at `times` (n,) [s], or the reason for its absence."""
     peak_time = float(curve.time[int(np.nanargmax(curve.normal))])
     inside = np.flatnonzero((times >= onset) & (times <= peak_time))
     if not len(times) or times[0] > onset or times[-1] < peak_time:

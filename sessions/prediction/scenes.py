@@ -136,7 +136,7 @@ def opposite(scene: Scene) -> Scene:
 
 
 def scene_along(row: TrialPrediction, variant: Variant, options: PredictionOptions) -> Scene | str:
-    """Return the settled scene of a trial in a variant, or why there is none."""
+    """Return the settled scene of a trial in a variant, or the reason for its absence."""
     if row.mu is None or row.tau_max is None or row.direction is None or row.indentation is None:
         return row.reasons.get("sed", "The trial gives no scene.")
     if variant.driven == "force" and (row.measured_normal is None or row.measured_normal <= 0.0):
@@ -265,7 +265,7 @@ def predict(
 
     The finger is that of the options, or else the published one with the plan's values of the subject. A trial without
     friction, depth or a settled state keeps its row, with the reason. The row at position `first` is solved first.
-    `watch` takes each row once it is known, at finite strain once all are. Raises SceneError where the options give no
+    `watch` takes each row when it is solved, at finite strain when all are. Raises SceneError where the options give no
     valid scene, Cancelled when `progress` returns False.
     """
     options = with_own_finger(options or PredictionOptions(), plan)

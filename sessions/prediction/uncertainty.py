@@ -103,7 +103,7 @@ def intervals_of(
 
 
 def _interval(prediction: Prediction, slide: Nearby | None, friction: DrawsOrReason, scale: float) -> SedInterval | str:
-    """Return the interval of a settled SED, or why there is none."""
+    """Return the interval of a settled SED, or the reason for its absence."""
     if slide is None:
         return "the state found depends on the way to it"
     loads = _loads(prediction.scene, friction, scale)

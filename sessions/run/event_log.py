@@ -101,7 +101,7 @@ class Step:
 
     readings: int  # handed over so far, from the beginning
     instant_ns: int  # session clock [ns]
-    act: Event | None = None  # what somebody did then
+    act: Event | None = None  # the act of a person
     losses: LoggedEvent | None = None  # what was reported of lost and distrusted readings
     zero_missing: bool = False  # a message has said that the zero cannot be measured
     end: Mapping[str, Any] | None = None  # how the session ended; empty for one that was cut short

@@ -68,7 +68,7 @@ class Status:
     readings: int  # handed to the recording
     lost: int  # readings that never arrived
     lag_ms: float  # age of the newest reading when it was handed over
-    safe: Acknowledged  # what the recording has acknowledged
+    safe: Acknowledged  # readings acknowledged by the recording
 
 
 @dataclass(frozen=True, slots=True)

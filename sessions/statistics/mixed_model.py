@@ -77,7 +77,7 @@ class _Likelihood:
 
     def maximum(self, starts: Sequence[Array]) -> Array:
         """Return the parameters (m,) of maximum likelihood."""
-        from scipy.optimize import minimize  # slow to load, and a session that is opened has no need of it
+        from scipy.optimize import minimize  # slow to load and not needed to open a session
 
         optima = [
             minimize(
@@ -124,7 +124,7 @@ class Fit:
 
 
 def reml_fit(y: Array, columns: Array, subjects: Sequence[str] | Array, random_terms: int) -> Fit:
-    """Return the fit of y (n) by `columns` (n, p), scaled alike; the first `random_terms` also vary by subject."""
+    """Return the fit of y (n) by `columns` (n, p) of one scale; the first `random_terms` also vary by subject."""
     indicators = indicator_columns(subjects)
     random = (indicators[:, :, None] * columns[:, None, :random_terms]).reshape(len(y), -1)
     triangle = np.tril_indices(random_terms)

@@ -190,7 +190,7 @@ def response_term(quantity: Quantity) -> str:
 
 
 def _model(trials: Sequence[tuple[str, TrialRow, float]], quantity: Quantity, *terms: str) -> MixedModel | str:
-    """Return the mixed model of scores on `terms`, drift and carry-over, or the reason why there is none.
+    """Return the mixed model of scores on `terms`, drift and carry-over, or the reason for its absence.
 
     Trials are subject, row and score. Slopes on the first of `terms` vary between subjects.
     """

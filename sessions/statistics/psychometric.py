@@ -177,7 +177,7 @@ class _ProfileLikelihood:
         fallback = None if parameter in (_PSE, _ORDER) else edge
         if value == edge:
             return fallback
-        from scipy.optimize import brentq  # slow to load, and a session that is opened has no need of it
+        from scipy.optimize import brentq  # slow to load and not needed to open a session
 
         drops = {value: -self.drop}
 
@@ -203,7 +203,7 @@ class _ProfileLikelihood:
         self, fixed: dict[int, float], start: Array, precision: float = _ENOUGH, *, adjusted: bool = False
     ) -> tuple[Array, float]:
         """Return the best parameters with some fixed, and their log likelihood, or the adjusted one."""
-        from scipy.optimize import minimize  # likewise
+        from scipy.optimize import minimize  # slow to load and not needed to open a session
 
         bounds = [(fixed[n], fixed[n]) if n in fixed else pair for n, pair in enumerate(self.bounds)]
         low, high = np.array(bounds).T / self.scale

@@ -134,7 +134,7 @@ def _counts(choices: Sequence[Choice], indices: Sequence[int], subjects: Sequenc
 
 def _no_scale(counts: Array, indices: Sequence[int]) -> str:
     """Return why values are not finite, "" where they are (Ford 1957, Am. Math. Mon. 64(8), 28)."""
-    from scipy.sparse.csgraph import connected_components  # slow to load, and an opened session has no need of it
+    from scipy.sparse.csgraph import connected_components  # slow to load and not needed to open a session
 
     meetings, wins = counts
     beaten = wins + (meetings - wins).T  # [a, b]: how often a was chosen over b

@@ -130,7 +130,7 @@ def agreement(table: Table) -> Agreement | None:
     n, stimuli = scores.shape
     if n < 2 or stimuli < 3 or np.all(np.ptp(scores, axis=1) == 0):
         return None
-    from scipy import stats  # slow to load, and a window that opens waits for it
+    from scipy import stats  # slow to load, which would delay the window
 
     friedman = stats.friedmanchisquare(*scores.T)
     page = stats.page_trend_test(scores)

@@ -1,7 +1,7 @@
 """Decisions of people about a session's strokes, in an append-only file in the session's folder.
 
-Readings never change. A decision sets one value of a stroke, a trial or the session, and states who decided it, when,
-why, and the value before; undoing it is a line of its own. The decisions in force follow from all lines.
+Readings never change. A decision sets one value of a stroke, a trial or the session, and states its author, date,
+reason and the value before. Another line can undo it. The decisions in force follow from all lines.
 """
 
 import os

@@ -245,7 +245,7 @@ def _candidates(steps: Array, width: int, floor: float, settings: SignalSettings
 
 
 def _stands_out(column: Array, suspect: Mask, start: int, width: int, settings: SignalSettings) -> bool:
-    """Say whether readings stand out by far more than any step around them between readings that are not `suspect`."""
+    """Say whether readings differ from both sides by far more than the steps around them, `suspect` ones left out."""
     around, stop = settings.wild_around, start + width
     stretches = (slice(max(start - around, 0), start), slice(stop, stop + around))
     earlier, later = (column[stretch][~suspect[stretch]] for stretch in stretches)

@@ -272,7 +272,7 @@ def press_of(span: Span, contact: Contact, zero: StrokeZero, trial: int | None) 
         return None
     scatter = ratio.std(axis=0, ddof=1) / np.sqrt(len(ratio))
     error_x, error_y = np.degrees(np.hypot(scatter, zero.error[:2] / float(blocks[:, 2].mean()))).tolist()
-    # The tilt already corrected is added: the lean is relative to the transducer.
+    # The tilt already corrected is added: the result is relative to the transducer.
     x, y = (np.degrees(np.arctan(ratio.mean(axis=0))) + settings.tilt).tolist()
     return Press(trial, start, stop, (x, y), (error_x, error_y))
 
@@ -281,7 +281,7 @@ def tilt_of(presses: Sequence[Press], settings: AnalysisSettings) -> Tilt | None
     """Return the tilt measured by presses, with intervals; None without presses."""
     if not presses:
         return None
-    from scipy.special import stdtrit  # slow to load, and neither window nor recorder has need of it
+    from scipy.special import stdtrit  # slow to load, and neither window nor recorder needs it
 
     mean = np.array([press.lean for press in presses]).mean(axis=0)
     per_cent = f"{100 * settings.confidence:g} %"

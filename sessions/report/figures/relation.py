@@ -171,7 +171,7 @@ def relation_panel(experiment: Experiment, predictions: Sequence[PredictionFindi
 
 
 def relation_title(experiment: Experiment) -> str:
-    """Return r with its interval and n, or why there is none, in short."""
+    """Return a short text: r with its interval and n, or the reason for its absence."""
     relation = experiment.score_relation
     if relation is None or relation.pearson is None:
         return "no r: " + (relation.reason if relation is not None and relation.reason else "no scores")
