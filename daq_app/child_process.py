@@ -66,11 +66,11 @@ class Child:
         child_end.close()
 
     def send(self, message: object) -> None:
-        """Send a message. Raises OSError where the process is gone."""
+        """Send a message. Raises OSError if the process is gone."""
         self._pipe.send(message)
 
     def receive(self) -> Any:  # noqa: ANN401  any message of the process
-        """Return the next message, None where none has come. Raises EOFError or OSError where the process is gone."""
+        """Return the next message, or None. Raises EOFError or OSError if the process is gone."""
         return self._pipe.recv() if self._pipe.poll() else None
 
     def close(self) -> None:

@@ -163,7 +163,7 @@ class FieldChoice:
     signed: bool
 
     def values_of(self, frame: Frame) -> Array:
-        """Return the field at the nodes of a frame (n,), in its own unit; nan where the frame has none."""
+        """Return the field at the nodes of a frame (n,), in its displayed unit; nan if the frame has none."""
         values = frame.values.get(self.name)
         return np.full(len(frame.nodes), np.nan) if values is None else self.factor * values
 

@@ -1,4 +1,4 @@
-"""The analyst's work in a process of its own, and its client in the window."""
+"""The analyst's work in a separate process, and its client in the window."""
 
 import signal
 import sys

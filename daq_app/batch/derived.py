@@ -40,7 +40,7 @@ from sessions.toml_file import SettingsError, from_table
 ANALYSIS = "analysis.json"
 PREDICTION = "prediction.json"
 _VERBS = {ANALYSIS: "analyse", PREDICTION: "predict"}  # verbs that compute them
-_SETTINGS = {  # what somebody may have set in them
+_SETTINGS = {  # settings that a person may have chosen
     ANALYSIS: "law of the contact area and seed of the intervals",
     PREDICTION: "options and afferent of the prediction",
 }

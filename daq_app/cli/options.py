@@ -57,7 +57,7 @@ def add_number(
 
 
 def add_flag(parser: argparse.ArgumentParser, name: str, meaning: str) -> None:
-    """Declare an option without a value, True where it is given."""
+    """Declare an option without a value, True if it is given."""
     parser.add_argument(name, action="store_true", help=meaning)
 
 

@@ -152,7 +152,7 @@ class ScreenFields(QWidget):
         vbox(language, self.thumbnail, self._ruler, self.camera, self._new_code, on=self, spacing=4)
 
     def show_line(self, scale: Millimetres, size: QSize) -> None:
-        """Say how far the length of the subject's line can be trusted, in a window of a `size`."""
+        """Show the origin of the length of the subject's line; `size` is that of the subject's window."""
         self._size = size
         self._line_words = tr("Line of {length:.0f} mm, {words}.", length=LENGTH, words=scale.origin)
         self.show_form()

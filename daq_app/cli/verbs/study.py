@@ -209,7 +209,7 @@ def _pool(options: argparse.Namespace, folder: Path, output: Path, console: Cons
         sessions, visit_options, shelf, console, scheduler=options.scheduler, workers=options.workers
     )
     if truth is not None and options.quantity == SED.name:
-        from daq_app.simulation.synthetic import population_relations  # loaded only where it is needed
+        from daq_app.simulation.synthetic import population_relations  # slow to load, and rarely needed
 
         truth["relation"] = population_relations(truth["people"], visit_options.prediction, visit_options.area)
     study = pool_visits(results, failures, exclusions, truth, visit_options, BY_NAME[options.quantity])
@@ -234,7 +234,7 @@ def _load_ground_truth(folder: Path) -> dict[str, Any] | None:
 
 
 def _files(output: Path, options: VisitOptions) -> dict[str, Path]:
-    """Return what is written, by what it is. Raises ReportError, and NotOurs where it would replace others'."""
+    """Return the output files by content. Raises ReportError, and NotOurs if one would replace a foreign file."""
     from sessions.report import pages  # drawing is slow to load
 
     names = {
