@@ -39,7 +39,7 @@ def open_transducer(uri: str, clock: Clock, *other_schemes: str) -> Transducer:
 
 
 def reachable(uris: Iterable[str] = (), patience: float = 0.5) -> tuple[Probe, ...]:
-    """Return what answers at the usual addresses and at `uris`, within `patience` [s] each; disturbs no device."""
+    """Return a probe of each usual address and of `uris`, within `patience` [s] each; disturbs no device."""
     usual = [uri for driver in DRIVERS for uri in driver.usual]
     return tuple(_probe(uri, patience) for uri in dict.fromkeys([*usual, *uris]))
 

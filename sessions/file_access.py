@@ -155,7 +155,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 class NotOurs(Exception):
-    """A file that would be written over is not ours: which one, what to do."""
+    """A file of another origin would be overwritten; the message names it and says what to do."""
 
 
 _MARK_LINES = 3  # lines at the head of a file: in our pictures the mark is in the third

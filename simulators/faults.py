@@ -114,7 +114,7 @@ class Faults:
         return wrench
 
     def route(self, now: float, datagrams: Iterable[tuple[float, bytes]]) -> list[bytes]:
-        """Return what departs by `now` [s]: of `datagrams`, each at its time [s], and of earlier delayed ones."""
+        """Return the departures by `now` [s] of `datagrams`, each with its time [s], and of earlier delayed ones."""
         departures: list[bytes] = []
         for time, datagram in datagrams:
             departures += self._overdue(time)

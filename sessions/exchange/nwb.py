@@ -59,7 +59,7 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
         keywords=["friction", "touch", "psychophysics", *(["SIMULATED"] if mark else [])],
         source_script=f"daq-app {source.analysis['made_by'].get('daq-app', '')}",
         source_script_file_name="daq-app export",
-        notes=compact_json(  # everything that the file otherwise lacks
+        notes=compact_json(  # all data without another place in the file
             {
                 **document,
                 "log": [asdict(event) for event in recording.events],

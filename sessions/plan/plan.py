@@ -103,7 +103,7 @@ class Rests:
 
     after_trials: int | None = None  # of a block; None: not within a block
     between_blocks: bool = False  # never between a practice and its block
-    duration: float | None = None  # [s]; None: until the experimenter goes on
+    duration: float | None = None  # [s]; None: until the experimenter continues
 
     def __post_init__(self) -> None:
         """Check ranges."""

@@ -34,7 +34,7 @@ _TOLERANCE = 0.0005  # of the SED: forces err by 0.04 %; at 0.1 % intervals cont
 
 
 class FitError(Exception):
-    """The finger cannot be fitted: why, and what to do."""
+    """The finger cannot be fitted; the message says why and what to do."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -59,9 +59,9 @@ def digest(numbers: Sequence[Mapping[str, Any]]) -> str:
 
 
 def sealed_sentence(recording: Recording, current: Sequence[Mapping[str, Any]]) -> str:
-    """Return whether the predictions that a report shows (`SEAL_NUMBERS` of each) were sealed, when and how blind.
+    """Return whether the predictions in a report (`SEAL_NUMBERS` of each) were sealed, when, and whether blinded.
 
-    An unreadable seal proves nothing, and prevents nothing else.
+    An unreadable seal proves nothing and is no error.
     """
     try:
         seal = load_derived(recording.folder, SEAL)

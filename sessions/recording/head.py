@@ -211,7 +211,7 @@ _IDENTITY = ("uri", "driver", "model", "serial", "simulated")
 
 
 def identity(info: TransducerInfo) -> dict[str, Any]:
-    """Return what identifies a transducer, and its rate [Hz]; null where that is unknown."""
+    """Return the identity of a transducer and its rate [Hz]; null where that is unknown."""
     return {name: getattr(info, name) for name in _IDENTITY} | {"rate": _none_for_nan(info.rate)}
 
 

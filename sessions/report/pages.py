@@ -1,4 +1,4 @@
-"""The pages of a session and of a study, each self-contained, with figures and trials as files of their own."""
+"""The pages of a session and of a study, each self-contained, with figures and trials in separate files."""
 
 import base64
 import errno

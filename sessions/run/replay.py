@@ -228,7 +228,7 @@ class _Player:
     def start(self) -> None:
         """Begin."""
 
-    def read(self, timeout: float) -> ReadingBlock:  # noqa: ARG002  nothing is waited for
+    def read(self, timeout: float) -> ReadingBlock:  # noqa: ARG002  never waits
         """Return the readings of this step; once stopped, all that remain."""
         step = self._step
         if self._stopped:

@@ -143,8 +143,8 @@ def continue_clock(
     duration = gap_ns * 1e-9 if gap_ns * 1e-9 > -CLOCKS_AGREE else None
     gap = {
         "gap": None if duration is None else max(duration, 0.0),  # [s]; None where the wall clock ran backwards
-        "last_ns": last_ns,  # session clock of the last thing recorded
-        "clock_offset_ns": offset_ns,  # session clock minus the clock of the program that goes on
+        "last_ns": last_ns,  # session clock of the last recorded data
+        "clock_offset_ns": offset_ns,  # session clock minus the clock of the continuing program
         "resumed_utc": date.astimezone(UTC).isoformat(timespec="milliseconds"),
     }
     return ContinuedClock(clock, offset_ns), gap

@@ -159,5 +159,5 @@ class Ended(Struct, frozen=True):
     complete: bool  # True when every trial was done or skipped
 
 
-OpenTake = Taring | Ready | Stroking | Scoring | Settling  # the states in which a take goes on
+OpenTake = Taring | Ready | Stroking | Scoring | Settling  # the states with an open take
 State = Idle | Mounting | Taring | Ready | Stroking | Scoring | Settling | Resting | Paused | Closing | Ended

@@ -80,7 +80,7 @@ class MagnitudeEstimate(Struct, frozen=True):
 
 
 class PairedChoice(Struct, frozen=True):
-    """The subject has said which of two stimuli has more of what is asked."""
+    """The subject has chosen the stimulus that has more of the descriptor."""
 
     choice: Choice | None  # None: the subject gave no answer
     first_touch: float | None = None  # [s, session clock]
@@ -90,7 +90,7 @@ class PairedChoice(Struct, frozen=True):
 
 
 class Note(Struct, frozen=True):
-    """The experimenter writes something down; nothing else changes."""
+    """The experimenter writes a note; nothing else changes."""
 
     text: str
 
@@ -114,11 +114,11 @@ class Skip(_WithReason, frozen=True):
 
 
 class Pause(Struct, frozen=True):
-    """Everybody rests."""
+    """The session is paused."""
 
 
 class Resume(Struct, frozen=True):
-    """The experimenter goes on, after a pause or a rest."""
+    """The experimenter continues after a pause or a rest."""
 
 
 class RestOver(Struct, frozen=True):
@@ -218,7 +218,7 @@ class AskNumber(Struct, frozen=True):
 
 
 class AskChoice(Struct, frozen=True):
-    """Have the subject say which of two; answered by PairedChoice."""
+    """Have the subject choose one of two; answered by PairedChoice."""
 
     first: Trial
     second: Trial  # the trial in hand

@@ -174,7 +174,7 @@ class StudyFindings:
     flaws: tuple[FlawDetection, ...] = ()  # where the study is synthetic
     synthetic: int | None = None  # the seed of a synthetic study
     response: str = SED.name  # the model's quantity that is compared with scores
-    blinded: tuple[str, ...] = ()  # sessions that count nothing until their key is opened
+    blinded: tuple[str, ...] = ()  # sessions that are not counted until their key is opened
 
     @property
     def misfits(self) -> tuple[Exclusion, ...]:

@@ -24,7 +24,7 @@ _WIDEST = 1e3  # largest such spread in the search: scores have three figures
 _NEARBY = 1e-5
 _SINGULAR = 1e-4  # of the factor's diagonal, as lme4 has it
 _NOTHING = 1e-9  # of the factor: its square is then below round-off
-_STEPS = 6  # of Newton's method, after which nothing changes
+_STEPS = 6  # of Newton's method; more change nothing
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""Protocol: a readable file that says how sessions are run. It is checked before anybody sits down."""
+"""Protocol: a readable file that says how sessions are run. It is checked before a session begins."""
 
 import re
 from collections.abc import Iterator, Sequence

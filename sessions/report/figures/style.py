@@ -195,7 +195,7 @@ def svg(picture: Sheet, name: str, title: str) -> str:
     return _finish_svg(buffer.getvalue(), name, title, picture.hover)
 
 
-SVG_MARK = '<svg role="img" aria-label='  # how the first element of our pictures begins, and of few others
+SVG_MARK = '<svg role="img" aria-label='  # start of the first element, in few pictures but ours
 
 
 def _finish_svg(text: str, name: str, title: str, hover: Mapping[str, str]) -> str:
