@@ -10,8 +10,8 @@ Lengths are in mm, times in s, forces in N per mm of width, stresses and energy 
 >>> [isinstance(answer, NoSteadyState) for answer in solve_many(scenes)]
 [False, True]
 
-What is not named here is private and may change; `docs/how-to/solve-another-body.md` names what other bodies need. What
-needs the compiled loops is loaded late.
+Other names are private and may change; `docs/how-to/solve-another-body.md` lists those that other bodies need. Names
+that need the compiled loops are imported on first use.
 """
 
 from importlib import import_module
@@ -71,12 +71,12 @@ __all__ = [
 
 
 def __dir__() -> list[str]:
-    """Return the public names, those loaded late too."""
+    """Return the public names, including those imported on first use."""
     return __all__
 
 
 def __getattr__(name: str) -> object:
-    """Return what is loaded late. Raises AttributeError for what there is not."""
+    """Import a public name on first use. Raises AttributeError for an unknown name."""
     if name not in _LATER:
         raise AttributeError(f"module 'solver' has no attribute '{name}'")
     return getattr(import_module(_LATER[name]), name)

@@ -1,9 +1,9 @@
-"""Energy, stress and tangent of the tissues, a class each; the lists of materials and of laws are at the foot.
+"""Energy, stress and tangent of the tissues' laws, one class each; `MATERIALS` and `LAWS` at the end list them.
 
-At small strain, gradients are those of the displacement. At finite strain F is (..., 2, 2) with F_zz = 1 (plane
+At small strain, gradients are displacement gradients. At finite strain, F is (..., 2, 2) with F_zz = 1 (plane
 strain). W is energy per undeformed volume [MPa], P = dW/dF the nominal stress (first Piola-Kirchhoff) and A = dP/dF.
-Every law at finite strain is W = G/2 shape(Q) + lambda/2 (ln J)^2 with Q = tr C - 3 - 2 ln J >= 0. So elements may
-replace the logarithm in the last term by a best fit.
+Every law at finite strain is W = G/2 shape(Q) + lambda/2 (ln J)^2 with Q = tr C - 3 - 2 ln J >= 0. Elements may
+therefore replace ln J in the last term by its best fit.
 """
 
 from dataclasses import dataclass, replace
@@ -15,11 +15,11 @@ from solver.arrays import NEO_HOOKEAN, Array, determinant, inverse
 
 HUMAN_SKIN = 9.0  # Ogden's exponent of human skin (ascribed to Shergold and Fleck 2004; docs/scene-file.md)
 _NEAR = 0.04  # Q up to which the series is used: above, the closed form loses no digits
-TERMS = 14  # of the series: enough up to an exponent of 20
+TERMS = 14  # terms of the series, enough for exponents up to 20
 
 
 class Elasticity(Protocol):
-    """Elastic constants that elements need of a material."""
+    """Elastic constants of a material that elements need."""
 
     @property
     def shear(self) -> float:
@@ -32,7 +32,7 @@ class Elasticity(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Isotropic:
-    """An isotropic elastic tissue, given by the two constants of small strain.
+    """An isotropic elastic tissue, given by its two small-strain constants.
 
     >>> round(Isotropic(0.08, 0.48).shear, 8), round(Isotropic(0.08, 0.48).lame, 8)
     (0.02702703, 0.64864865)
@@ -105,7 +105,7 @@ class Prony(Isotropic):
         return self._with(self.long_term)
 
     def within(self, step: float) -> Moduli:
-        """Return the moduli, stress by strain, at the end of a `step` [s] in which strain grows linearly from zero.
+        """Return the secant moduli at the end of a `step` [s] in which strain grows linearly from zero.
 
         After one relaxation time the shear modulus is 0.7 + 0.3 (1 - 1/e) of the instantaneous one:
 
@@ -125,7 +125,7 @@ def mean_decay(times: Array) -> Array:
 
 
 class Law(Elasticity, Protocol):
-    """Properties that elements need of a law at finite strain."""
+    """Properties of a finite-strain law that elements need."""
 
     name: ClassVar[str]
 
@@ -145,7 +145,7 @@ class NeoHooke(Isotropic):
 
     @property
     def stiffening(self) -> float:
-        """The exponent without stiffening."""
+        """The exponent of a constant shear modulus."""
         return NEO_HOOKEAN
 
 
@@ -167,7 +167,7 @@ class Ogden(Isotropic):
 
 
 def log1p(x: Array) -> Array:
-    """Return ln(1 + x); NumPy's own loses digits of a small complex x. Imaginary parts must be infinitesimal."""
+    """Return ln(1 + x); `np.log1p` loses digits of a small complex x. Imaginary parts must be infinitesimal."""
     log = np.log1p(x.real)
     return cast("Array", log + 1j * (x.imag / (1.0 + x.real))) if np.iscomplexobj(x) else log
 
@@ -271,7 +271,7 @@ class Past:
 
     Each term (g, tau) is a network whose strands detach and reattach unstrained (Green and Tobolsky 1946, J. Chem.
     Phys. 14, 80; as a law of solids Linder, Tkachuk and Miehe 2011, J. Mech. Phys. Solids 59, 2134). A is the inverse
-    metric in which the network would be unstrained. It follows the body's own, B = (C J^-2/3)^-1. The stress is
+    metric in which the network would be unstrained. It relaxes towards the body's, B = (C J^-2/3)^-1. The stress is
     isochoric, as in Simo (1987, Comput. Meth. Appl. Mech. Eng. 60, 153):
 
         dA/dt = (B - A)/tau,    W = g G/2 (tr(A B^-1) - 3 - ln det A),    S = g G J^-2/3 (A - (A:C)/3 C^-1).
@@ -279,8 +279,8 @@ class Past:
     Energy is only dissipated, at a rate of g G/(2 tau) times the sum of a + 1/a - 2 over the eigenvalues a of A B^-1.
     After a sudden strain S decays as exp(-t/tau); at small strain this is the generalised Maxwell solid of `Prony`.
     Within a step B changes linearly, for which the recursion is exact (as in `equilibrium.relaxation`). All terms act
-    as one tensor T = sum g G A', where A' is A without the share of B at the end, which has no stress. So a step is
-    elastic with W = 1/2 J^-2/3 T:C. Tensors are (..., 4): xx, yy, xy, zz, the other two zero; plane strain, F_zz = 1.
+    as one tensor T = sum g G A', where A' is A without the share of B at the end, which carries no stress. A step is
+    thus elastic with W = 1/2 J^-2/3 T:C. Tensors are (..., 4): xx, yy, xy, zz, the other two zero; plane strain.
     """
 
     shear: Array  # (p, m) g G [MPa]

@@ -1,4 +1,4 @@
-"""The contact law of a point, with Coulomb friction and a traction bound, and the loads by a flat rigid surface.
+"""The contact law of a point, with Coulomb friction and a traction bound, and the loads of a flat rigid surface.
 
 For a point, g is the gap, N >= 0 the normal force of the surface along y, and T the force along x. v is its slip
 relative to the surface along x within a step, and L its tributary length of skin:
@@ -18,11 +18,11 @@ A point is in one of four states, s = +1 or -1 being the sense of the friction f
     slip    g = 0, T = s mu N         until N < 0, mu N > tau_max L or s v > 0
     cap     g = 0, T = s tau_max L    until N < 0, mu N < tau_max L or s v > 0
 
-`solver._kernels.active_set` searches for states without contradiction, at both kinematics; at finite strain L is that
-of the deformed skin. The list of laws is at the foot; one test checks the states of every law.
+`solver._kernels.active_set` searches for consistent states, at both kinematics. At finite strain L is the deformed
+length. `FRICTION_LAWS` lists the laws; one test checks the states of every law.
 
-Contact ends between two nodes. The end is known to about a tenth of an element, because pressure falls there like the
-square root of the distance. So the force beyond a line between elements has its centre at 2/5 of the way to the end.
+Contact ends between two nodes. The end is located to about a tenth of an element, because pressure falls there like
+the square root of the distance: the force beyond a line between elements has its centre at 2/5 of the way to the end.
 """
 
 from dataclasses import dataclass
@@ -51,7 +51,7 @@ class FrictionLaw:
             raise ValueError(f"mu = {self.mu} is not allowed: a coefficient of friction is a number from 0 on")
         if not self.tau_max >= 0.0:
             raise ValueError(f"tau_max = {self.tau_max} is not allowed: a bound is a traction from 0 on, or infinite")
-        object.__setattr__(self, "mu", float(self.mu))  # integers too: loops are compiled for floats
+        object.__setattr__(self, "mu", float(self.mu))  # also from integers: the kernels take floats
         object.__setattr__(self, "tau_max", float(self.tau_max))
 
     def limit(self, force: Array, length: Array) -> Array:
@@ -75,7 +75,7 @@ class LoadState(NamedTuple):
     depth: float  # indentation: travel of the bone towards the surface [mm]
     mu: float  # [-]
     tau: float = np.inf  # traction bound [MPa]
-    sense: int = 0  # of the friction force on the skin in settled sliding, +1 or -1; 0: it sticks or slips
+    sense: int = 0  # of the friction force on the skin in full slip, +1 or -1; 0: nodes may stick or slip
     travel: float = 0.0  # of the surface along +x relative to the bone [mm]
 
     @property
@@ -89,7 +89,7 @@ class LoadState(NamedTuple):
         return self.sense == 0 and not self.frictionless
 
     def towards(self, target: "LoadState", part: float) -> "LoadState":
-        """Return the load state a `part` of the way to `target`; a bound where there was none is taken whole."""
+        """Return the load state a `part` of the way to `target`; a bound that is new applies in full."""
         if part == 1.0:
             return target
         tau = self.tau + part * (target.tau - self.tau) if max(self.tau, target.tau) < np.inf else target.tau
@@ -121,7 +121,7 @@ class ForceLoad(NamedTuple):
         return ForceLoad(finite("normal", self.normal), drag, finite("travel", self.travel))
 
     def towards(self, target: "ForceLoad", part: float) -> "ForceLoad":
-        """Return the forces a `part` of the way to `target`, which gives the same quantities."""
+        """Return the forces a `part` of the way to `target`, which prescribes the same quantities."""
         start, drag = self.tangential or 0.0, target.tangential
         normal, travel = self.normal + part * (target.normal - self.normal), target.travel - self.travel
         return ForceLoad(normal, None if drag is None else start + part * (drag - start), self.travel + part * travel)
@@ -164,7 +164,7 @@ def width(arcs: Array, x: Array, force: Array, touching: NDArray[np.bool_]) -> f
 def last_edge(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> float | None:
     """Return the end of contact towards the last of the `arcs` (k,) [mm]; None where contact is too short to locate it.
 
-    `force` (k,) is a quantity at the nodes that falls to zero there like the square root of the distance. Nodes
+    `force` (k,) is a nodal quantity that falls to zero at that end like the square root of the distance. Nodes
     alternate between ends and middles of edges, an end first.
     """
     on = [number for number, touches in enumerate(touching.tolist()) if touches]  # few: lists are fast
@@ -174,9 +174,9 @@ def last_edge(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> float |
     line = last - 2 if last % 2 == 0 else last - 1  # the last line between elements with contact on both sides
     place, forces = arcs.tolist(), force[line : last + 1].tolist()
     gaps = place[line] - place[line - 2], place[line + 2] - place[line]
-    forces[0] *= gaps[1] / (gaps[0] + gaps[1])  # the share of the line's own force that acts beyond it
+    forces[0] *= gaps[1] / (gaps[0] + gaps[1])  # the share of the line's force that acts beyond it
     moment = sum(push * (position - place[line]) for push, position in zip(forces, place[line : last + 1], strict=True))
-    # Force that falls like the square root of the distance has its centre two fifths of the way to its end. That lies
-    # nearer to the last touching node than to the one before.
+    # A force that falls like the square root of the distance has its centre two fifths of the way to its end. This end
+    # lies nearer to the last touching node than to the one before.
     end, least = place[line] + 2.5 * moment / sum(forces), (place[last - 1] + place[last]) / 2.0
     return min(max(end, least), place[min(last + 1, len(place) - 1)])

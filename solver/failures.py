@@ -1,10 +1,10 @@
-"""Failures of a solve: a sentence each, and the limits where they are known."""
+"""Failures of a solve, each with one sentence and the limits that are known."""
 
 from typing import Any
 
 
 class SolveFailure(Exception):
-    """A scene without a solution. `kind` tells scripts which failure it is."""
+    """A scene without a solution. `kind` identifies the failure for scripts."""
 
     kind = "failed"
 
@@ -16,7 +16,7 @@ class SolveFailure(Exception):
         limit_indentation: float | None = None,
         limit_normal_force: float | None = None,
     ) -> None:
-        """Say at which load the solver failed, why and what it tried; give limits where they are known.
+        """Store the `message`, which states the load, the cause and the attempts, and the limits that are known.
 
         `limit_mu` is the largest coefficient of friction at this depth or force, with this bound. `limit_indentation`
         [mm] is the largest depth at this coefficient and bound. `limit_normal_force` [N/mm] is the largest force, where
@@ -48,7 +48,7 @@ class NoSteadyState(SolveFailure):
 
 
 def beyond_friction(drag: float, most: float, normal_force: float) -> NoSteadyState:
-    """Return the failure of a prescribed `drag` beyond the friction limit; the finger slides from `most` on [N/mm]."""
+    """Return the failure of a prescribed `drag` beyond `most`, the friction limit [N/mm]."""
     return NoSteadyState(
         f"A drag of {drag:.4g} N/mm lies outside the friction limit: pressed with {normal_force:.4g} N/mm, the finger "
         f"slides from {most:.4g} N/mm on; ask for less drag, or leave it out to let the finger slide."
@@ -65,11 +65,11 @@ class NotConverged(SolveFailure):
 
 
 class Folds(NotConverged):
-    """Tissue folds, at the free cut or in wrinkles, so that finer meshes come to other folds and no error is known."""
+    """Tissue folds at the free cut, or wrinkles. Finer meshes fold differently, so that no error is known."""
 
 
 def cut_folds(least: float, folds: float) -> Folds:
-    """Return the failure where tissue is squeezed to `least` of its length, and a free face folds at `folds` [-].
+    """Return the failure of tissue squeezed to the stretch `least`, where a free face folds at `folds` [-].
 
     >>> str(cut_folds(0.31, 0.54))[:88]
     'tissue beside the free cut folds (it is squeezed to 31 % of its length, and a free face '
@@ -87,7 +87,7 @@ WRINKLES = (
 
 
 class ContactLost(NotConverged):
-    """No set of contact states without contradiction was found; the message says what was tried."""
+    """No consistent set of contact states was found; the message says what was tried."""
 
 
 def at_end_of_path(depth: float, travel: float, reason: object) -> NotConverged:

@@ -1,6 +1,6 @@
 """Elimination order of a body's inner unknowns, down to those of its skin: nested dissection.
 
-Elements are bisected by position again and again. The unknowns inside each part are eliminated, then the parts are
+Elements are bisected by position, recursively. The unknowns inside each part are eliminated, then the parts are
 joined, and so on up the tree (George 1973, SIAM J. Numer. Anal. 10, 345; Duff and Reid 1983, ACM TOMS 9, 302). The
 result is the exact Schur complement, the stiffness condensed to the skin. Contact is solved with this small dense
 matrix. The work grows like unknowns^1.5.
@@ -41,7 +41,7 @@ def _halve(order: Indices, centres: Array, low: Indices, high: Indices) -> Indic
     ascending = np.lexsort((x, part))
     order[position], x = order[position][ascending], x[ascending]
     between = np.append(False, x[1:] != x[:-1]) & (position != low[part])
-    ends = (low + high)[part]  # a part in which all have the same x is cut in its middle
+    ends = (low + high)[part]  # a part whose elements all have the same x is cut in its middle
     distance = np.where(between, np.abs(2 * position - ends), 2 * len(order) + (position != ends // 2))
     nearest = np.flatnonzero(distance == np.minimum.reduceat(distance, begins)[part])
     return position[nearest[np.searchsorted(part[nearest], np.arange(len(size)))]]
@@ -50,8 +50,8 @@ def _halve(order: Indices, centres: Array, low: Indices, high: Indices) -> Indic
 def _bisect(centres: Array, most: int) -> _Tree:
     """Return the parts of elements at `centres` (e, 2), at most `most` elements in a part that is not bisected.
 
-    All parts of one level are bisected at once, each along its longer side and between two rows or columns next to its
-    middle: the line of a stepped cut has more nodes.
+    All parts of one level are bisected together, each along its longer side and between the two rows or columns next to
+    its middle, since a stepped cut has more nodes.
     """
     order, count = np.arange(len(centres)), len(centres)
     low, high = np.array([0]), np.array([count])
@@ -132,7 +132,7 @@ def places(elements: Indices) -> Array:
             continue
         place[seed] = 0, 0
         connected = [seed]
-        for element in connected:  # neighbours are appended meanwhile
+        for element in connected:  # the loop appends neighbours
             row, column = place[element]
             for (down, right), neighbour in zip(_SIDES, neighbours[element], strict=True):
                 if neighbour >= 0 and neighbour not in place:
@@ -145,14 +145,14 @@ _LEAF: Final = 8  # most elements in a part that is not bisected
 
 
 def symbolic_factorization(mesh: Mesh) -> SymbolicFactorization:
-    """Plan the elimination of `mesh`, whose element centres are condensed before.
+    """Plan the elimination of `mesh`, whose element centres are condensed beforehand.
 
-    The plan does not depend on nodal positions: the last plans are kept for meshes that differ only in these.
+    The plan does not depend on nodal positions, so meshes that differ only in these share a cached plan.
     """
     return _plan(len(mesh.nodes), mesh.elements.tobytes(), mesh.skin.tobytes(), mesh.fixed.tobytes())
 
 
-@lru_cache(maxsize=16)  # a search for a tolerance makes 8 plans; room for 4 makes each anew, for 32 gains nothing
+@lru_cache(maxsize=16)  # a refinement makes 8 plans: a cache of 4 misses them all, one of 32 gains nothing
 def _plan(count: int, *numbers: bytes) -> SymbolicFactorization:
     """Return the plan for `count` nodes; `numbers` are bytes: element nodes (e, 9), skin nodes, fixed unknowns."""
     elements, skin_nodes, fixed = (np.frombuffer(part, np.int64) for part in numbers)
@@ -177,7 +177,7 @@ def _plan(count: int, *numbers: bytes) -> SymbolicFactorization:
     border_at = np.cumsum(border) - border
 
     def position(part: Indices, unknown: Indices) -> Indices:
-        """Return where unknowns stand in the front of a part: those that it eliminates, then its border."""
+        """Return the positions of unknowns in the front of a part: its eliminated unknowns, then its border."""
         in_border = np.searchsorted(keys, part * len(sequence) + unknown) - border_at[part]
         in_inner = unknown - start[part]
         return np.where(in_inner < inner[part], in_inner, inner[part] + in_border)
@@ -226,7 +226,7 @@ def _runs(place: Narrow, border: Indices) -> Indices:
 
 
 def _waiting(tree: _Tree, border: Indices) -> tuple[Indices, int]:
-    """Return where each part's Schur complement waits for its parent, and the size of the memory for all.
+    """Return the offset at which each part's Schur complement waits for its parent, and the size of that memory.
 
     Each level of the tree has a place for a first and a second child.
     """
@@ -247,7 +247,7 @@ class ElementSubset(NamedTuple):
 
 
 class Elimination:
-    """Elimination of one body's tangent down to its skin, with its own memory."""
+    """Elimination of one body's tangent down to its skin, and the memory for it."""
 
     def __init__(self, plan: SymbolicFactorization) -> None:
         """Allocate memory for `plan`."""

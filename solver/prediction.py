@@ -13,32 +13,32 @@ from solver.mesh.mesher import FingerMesh
 from solver.quantities import NAMES, QUANTITIES, SED
 from solver.scene import Scene
 
-FORCES_AND_PLACES = 7  # numbers with an estimate beside the quantities: `all_numbers` begins with them
+FORCES_AND_PLACES = 7  # results with an error estimate besides the quantities; they come first in `all_numbers`
 COUNT = FORCES_AND_PLACES + len(NAMES)
 ROW: Array = 0.25 * np.arange(-32.0, 25.0)  # arc positions of the row of receptors [mm]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Row:
-    """Receptors alike at arc positions along the skin; the reference ending is the one at 0."""
+    """Identical receptors at arc positions along the skin; the reference ending is the one at 0."""
 
     arc: Array  # (r,) from first touch, positive towards the tip, on the undeformed skin [mm]
-    sed: Array  # (r,) SED averaged over each ending [MPa]; nan where the finger ends before it
+    sed: Array  # (r,) SED averaged over each ending [MPa]; nan for one outside the finger
     error: Array  # (r,) error estimate of each, relative; nan where unknown
 
 
 class Response(NamedTuple):
-    """One quantity at the ending, averaged over it, in its own unit."""
+    """One quantity averaged over the ending, in the quantity's unit."""
 
     value: float
-    error: float  # its estimate; nan where unknown
+    error: float  # estimated; nan where unknown
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Skin:
     """The skin's nodes that may touch, in order from proximal to distal."""
 
-    x: Array  # (k,) deformed position along the surface, bone's first touch at 0 [mm]
+    x: Array  # (k,) deformed position along the surface, 0 at the bone's first touch [mm]
     gap: Array  # (k,) height over the surface, 0 where it touches [mm]
     pressure: Array  # (k,) [MPa], 0 where the gap is open
     traction: Array  # (k,) tangential, of the surface on the skin along +x [MPa]
@@ -67,11 +67,11 @@ class History:
     tangential_force: Array  # (m,) drag opposing the slide [N/mm]
     contact_width: Array  # (m,) [mm]
     slipping: Array  # (m,) part of the touching skin nodes that slip [-]
-    responses: Array  # (m, q) every quantity at the ending; where tissues relax the SED alone, nan for the others
+    responses: Array  # (m, q) all quantities at the ending; nan for all but the SED where tissues relax
 
 
 def sed_alone(sed: Array) -> Array:
-    """Return responses (m, q) with the SED (m,) alone, nan for the others."""
+    """Return responses (m, q) with the SED (m,), nan for all other quantities."""
     out = np.full((len(sed), len(NAMES)), np.nan)
     out[:, NAMES.index(SED.name)] = sed
     return out
@@ -84,14 +84,14 @@ class NestedNumbers:
     numbers: Array  # (COUNT,)
     edge_changes: Array  # (m, COUNT) their changes as each of m edges of contact moves by a node of that mesh
     row: Array  # (r,) SED of the row of receptors [MPa]
-    row_edge_changes: Array  # (m, r) its changes likewise
-    order: float  # of convergence, which their errors assume
-    shares: Array | None = None  # (a + b,) of the SED's error in each column and row of the mesh, where it is too large
+    row_edge_changes: Array  # (m, r) changes of `row` as each edge moves
+    order: float  # order of convergence that the error estimates assume
+    shares: Array | None = None  # (a + b,) of each column and row of the mesh in the SED's error, where it is too large
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prediction:
-    """The settled response of one scene, or the last state of its course."""
+    """The settled response of one scene, or the last state of its load path."""
 
     scene: Scene
     sed_ending: float  # SED averaged over the ending [MPa]
@@ -99,37 +99,37 @@ class Prediction:
     normal_force: float  # of the surface on the finger along +y [N/mm]
     tangential_force: float  # drag opposing the slide [N/mm]
     contact_width: float  # from the first to the last touching point, along the surface [mm]
-    indentation: float  # of the bone, asked for or found under a given force [mm]
-    shift: float | None  # of the bone along +x, found under a given drag [mm]; None where it slides or is only pressed
+    indentation: float  # of the bone, given or computed for a given force [mm]
+    shift: float | None  # of the bone along +x under a given drag [mm]; None where it slides or is only pressed
     error_estimate: float  # half width of the interval about sed_ending, relative [-]
     corrected_error: float  # half width of the interval about sed_ending_corrected, relative [-]
     dofs: int  # unknown displacements
     newton_iterations: int  # solutions of a linear system with trial contact states
-    wall_s: float  # the solve alone: this scene's, and its part of what scenes solved together share [s]
+    wall_s: float  # time of the solve: this scene's, and its part of the work shared by scenes solved together [s]
     setup_s: float  # mesh and tables; shared by scenes solved together [s]
-    estimate_s: float  # time for the error estimate beside the solve, likewise [s]
+    estimate_s: float  # time of the error estimate, not part of `wall_s` but shared in the same way [s]
     row: Row
-    responses: Mapping[str, Response]  # every quantity of `solver.quantities` at the ending, by its name
+    responses: Mapping[str, Response]  # every quantity of `solver.quantities` at the ending, by name
     model: Mapping[str, Any]  # assumptions, omitted effects, and the evidence on these
     audits: Mapping[str, float]  # checks; residuals relative unless their name says otherwise
     skin: Skin
     geometry: FingerMesh
     displacement: Array  # (nodes, 2) relative to the bone [mm]
     history: History | None = None
-    evidence_s: float | None = None  # time for marching and measuring the evidence in `model` [s]; None: none was asked
+    evidence_s: float | None = None  # time of the solves for the evidence in `model` [s]; None: none was requested
     sed_point_error: float = 1.0  # estimated, of sed_point, relative [-]
     normal_force_error: float | None = None  # estimated, of normal_force, relative [-]; None: it was given
-    tangential_force_error: float | None = None  # likewise of tangential_force; 0 where there is no friction
-    indentation_error: float | None = None  # likewise of indentation; None where that was given
-    shift_error: float | None = None  # estimated, of shift [mm]; None where there is none
+    tangential_force_error: float | None = None  # estimated, relative [-]; None: force was given; 0 without friction
+    indentation_error: float | None = None  # estimated, of indentation, relative [-]; None: it was given
+    shift_error: float | None = None  # estimated, of shift [mm]; None without a shift
     contact_width_error: float | None = None  # estimated, of contact_width, relative [-]
     nested: NestedNumbers | None = None  # on the nested mesh, for the error estimates; None where errors are unknown
-    unknown: SolveFailure | None = None  # why they are; None where errors are known
+    unknown: SolveFailure | None = None  # why errors are unknown; None where they are known
     warnings: tuple[str, ...] = field(default=())  # one sentence each
 
     @property
     def sed_ending_corrected(self) -> float:
-        """SED averaged over the ending on the nested mesh [MPa], the best value; `sed_ending` without a state there."""
+        """SED averaged over the ending on the nested mesh [MPa], the best value; `sed_ending` where it has no state."""
         return self.sed_ending if self.nested is None else float(self.nested.numbers[0])
 
     @property
@@ -138,7 +138,7 @@ class Prediction:
         return self.geometry.mesh
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what `daq-app solve --json` prints: plain numbers, lists and strings."""
+        """Return the object that `daq-app solve --json` prints: plain numbers, lists and strings."""
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("history", "nested", "unknown")}
         plain: dict[str, Any] = {k: value for k, value in values.items() if isinstance(value, int | float | None)}
         if self.nested is None:  # errors are unknown
@@ -167,7 +167,7 @@ class Prediction:
 
 
 def percent(part: float) -> str:
-    """Return a part in per cent for people, two digits or all before the point.
+    """Return a part in per cent, rounded to two digits, or to a whole number from 99.5 % on.
 
     >>> percent(0.00432), percent(0.996), percent(1.42)
     ('0.43 %', '100 %', '142 %')
@@ -181,14 +181,14 @@ def _response(response: Response) -> dict[str, float | None]:
 
 
 def _plain(numbers: Array) -> list[float | None]:
-    """Return an array as JSON has it: null where there is no number."""
+    """Return an array as a list for JSON, with None for nan."""
     return [None if number != number else number for number in numbers.tolist()]
 
 
 def drag(scene: Scene, along: float) -> float:
-    """Return the drag opposing the slide [N/mm] for the surface's force `along` +x on it, without a slide its size.
+    """Return the drag opposing the slide [N/mm] for the surface's force `along` +x, its magnitude without a slide.
 
-    0 where nothing rubs and where a drag of none is given, that force being round-off then; never -0.
+    It is 0, and never -0, without friction and for a prescribed drag of 0, where the force is round-off.
     """
     if scene.friction.frictionless or scene.tangential_force == 0.0:
         return 0.0

@@ -1,8 +1,8 @@
 """Responses of the tissue at a receptor, and the local state they follow from: energies, strains and stresses.
 
 At an ending, each response is averaged over the points of its patch. Strains along the skin are in the frame of the
-undeformed skin; stretches are given less one. Stresses are Cauchy's, with the out-of-plane ones. The list of quantities
-is at the foot; the first is the published one.
+undeformed skin; stretches are given less one. Stresses are Cauchy stresses, including the out-of-plane stress.
+`QUANTITIES` lists the responses; the first is the published one.
 """
 
 from collections.abc import Callable
@@ -19,9 +19,9 @@ Stress = tuple[Array, Array, Array, Array]  # xx, yy, xy, zz of plane strain [MP
 
 @dataclass(frozen=True, eq=False)  # without slots, for cached properties
 class LocalState:
-    """Deformation and moduli of n points, in c states of the body each. All arrays broadcast to (n, c).
+    """Deformation and moduli of n points, each in c states of the body. All arrays broadcast to (n, c).
 
-    The displacement gradient is du_a/dx_b; at small strain only its symmetric part. `tangent` is a unit vector along
+    The displacement gradient is du_a/dx_b; small strain uses only its symmetric part. `tangent` is a unit vector along
     the undeformed skin above the point, towards the tip; its normal points into the tissue. Numbers may be complex, for
     complex-step derivatives.
     """
@@ -38,17 +38,17 @@ class LocalState:
 
     @property
     def volume(self) -> Array:
-        """J, volume by undeformed volume at the point itself [-]."""
+        """J, the ratio of deformed to undeformed volume at the point [-]."""
         return 1.0 + self._volume_growth
 
     @cached_property
     def log_volume(self) -> Array:
-        """Logarithm of J at the point itself, without cancellation [-]."""
+        """Logarithm of J at the point, without cancellation [-]."""
         return log1p(self._volume_growth)
 
     @cached_property
     def excess(self) -> Array:
-        """Tr C - 3 - 2 ln J at the point itself, without cancellation [-]."""
+        """Tr C - 3 - 2 ln J at the point, without cancellation [-]."""
         squares = self.xx**2 + self.xy**2 + self.yx**2 + self.yy**2
         return 2.0 * (self.trace - self.log_volume) + squares
 
@@ -58,7 +58,7 @@ class LocalState:
 
     @property
     def trace(self) -> Array:
-        """Trace of the displacement gradient: at small strain, the volume strain at the point itself [-]."""
+        """Trace of the displacement gradient: at small strain, the volume strain at the point [-]."""
         return self.xx + self.yy
 
     @property
@@ -79,7 +79,7 @@ class LocalState:
 
     @cached_property
     def finite_stress(self) -> Stress:
-        """Cauchy's stress sigma = (G f (F F^T - 1) + lambda ln J 1) / J [MPa]."""
+        """The Cauchy stress sigma = (G f (F F^T - 1) + lambda ln J 1) / J [MPa]."""
         J = self.volume
         shear = self.shear * slopes(self.stiffening, self.excess)[0] / J
         bulk = self.lame * self.dilatation / J
@@ -105,7 +105,7 @@ class Quantity:
 
     @property
     def shown_unit(self) -> tuple[str, float]:
-        """Return the unit in which people read it, and a number in that by the one in `unit`.
+        """Return the unit for display, and the factor from `unit` to it.
 
         >>> SED.shown_unit, SHEAR.shown_unit
         (('kPa', 1000.0), ('1', 1.0))
@@ -125,12 +125,12 @@ def _finite_energy(local: LocalState) -> Array:
 
 
 def _small_volumetric(local: LocalState) -> Array:
-    """Return K/2 theta^2, K = lambda + 2 G/3; the part of G is from the volume strain at the point itself."""
+    """Return K/2 theta^2 [MPa], K = lambda + 2 G/3; the term in G uses the volume strain at the point."""
     return local.lame / 2.0 * local.dilatation**2 + local.shear / 3.0 * local.trace**2
 
 
 def _finite_volumetric(local: LocalState) -> Array:
-    """Return W of the same change of volume, equal in all three directions."""
+    """Return W of the same change of volume with equal stretches in all three directions [MPa]."""
     dilated = 3.0 * np.expm1(2.0 / 3.0 * local.log_volume) - 2.0 * local.log_volume  # tr C - 3 - 2 ln J
     return local.shear / 2.0 * shape(local.stiffening, dilated) + local.lame / 2.0 * local.dilatation**2
 

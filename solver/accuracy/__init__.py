@@ -1,1 +1,1 @@
-"""How far a number may be off, and the meshes that a tolerance asks for."""
+"""Error estimates, and the meshes that a tolerance requires."""

@@ -2,15 +2,15 @@
 
 A mesh is refined by the share of each column and row in the error of the ending's SED.
 
-The lines of a mesh divide it into columns and rows. The solution u and the adjoint z of the SED are known on the nested
-mesh, which divides every element into four. A column does not resolve the difference of u and z from their quadratic
-interpolants across it. The product of both differences in the energy of shear is the column's share of the error
+The lines of a mesh divide it into columns and rows. The solution u and the adjoint z of the SED are computed on the
+nested mesh, which divides every element into four. A column does not resolve the differences between u and z and their
+quadratic interpolants across it. The mutual shear energy of both differences is the column's share of the error
 (dual-weighted residuals: Becker and Rannacher 2001, Acta Numerica 10, 1; by directions: Richter 2010, Int. J. Numer.
-Meth. Fluids 62, 90). Rows likewise. The energy of volume is left out, because interpolants of nearly incompressible
-tissue change volume and solutions do not. The shares are therefore relative, and are scaled to the estimate from two
-meshes (`solver.accuracy.error_estimate`).
+Meth. Fluids 62, 90). The same holds for rows. The volumetric energy is left out, because interpolants of nearly
+incompressible tissue change volume and solutions do not. The shares are therefore relative, and are scaled to the
+estimate from two meshes (`solver.accuracy.error_estimate`).
 
-At finite strain the undeformed body takes the place of the tangent.
+At finite strain the stiffness of the undeformed body replaces the tangent.
 """
 
 from dataclasses import dataclass, replace
@@ -35,15 +35,15 @@ from solver.mesh.mesher import FINEST, FingerMesh
 from solver.prediction import NestedNumbers
 from solver.scene import Scene
 
-MAX_UNKNOWNS = 25_000  # unknowns of a mesh: its nested one has 100,000, which take 1 s at small strain and 4 at finite
+MAX_UNKNOWNS = 25_000  # of a mesh: its nested mesh has 100,000, solved in 1 s at small strain and in 4 s at finite
 # Measured on 23 scenes at tolerances of 0.3 and 0.05 %: halving or doubling one of the next four costs 1 to 18 % more
 # work, except for a smaller growth, which costs 4 % less in more rounds.
 MAX_DIVISION = 4  # of one gap in a round, at most: an error says little about elements many times smaller
 GROWTH = 1.3  # of the unknowns in a round, at least
 TARGET_ERROR = 0.6  # sum of the parts on the next mesh, relative to the tolerance
 SHARE_ORDER = 4.0  # power of a gap's size with which its part falls, where solutions are smooth
-_SCALES = 200  # that are tried, each a tenth smaller
-QUADRATIC = line(np.linspace(-1.0, 1.0, 5))[0]  # (5, 3) at the nodes of two elements, by those of the one they divide
+_SCALES = 200  # scales to try, each a tenth smaller
+QUADRATIC = line(np.linspace(-1.0, 1.0, 5))[0]  # (5, 3) from the nodes of one element to those of its two halves
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +54,7 @@ class NestedGrid:
     nodes: Indices  # (a, b, 5, 5)
     shear: Array  # (a, 2, b, 2, 18, 18) stiffness of the quarters' shear moduli alone
     affine: Array  # (a, b, 25, 3) functions 1, x, y
-    fit: Array  # (a, b, 3, 25) what fits them to values at the nodes
+    fit: Array  # (a, b, 3, 25) their least-squares fit to nodal values
 
     @staticmethod
     def of(finger: LinearFinger) -> "NestedGrid":
@@ -87,15 +87,15 @@ class NestedGrid:
         return np.abs(self._energy(*columns).sum(axis=1)), np.abs(self._energy(*rows).sum(axis=0))
 
     def _curvature(self, values: Array) -> Array:
-        """Return nodal values (nodes, 2) by element (a, b, 5, 5, 2) less what fits 1, x, y best.
+        """Return nodal values (nodes, 2) by element (a, b, 5, 5, 2), less their best fit by 1, x, y.
 
-        Nodes of divided elements lie on the outline, and not where the element that they divide has it.
+        Nodes of the nested mesh lie on the outline, which the element that they divide only approximates.
         """
         local = values[self.nodes].reshape(*self.affine.shape[:3], 2)
         return (local - self.affine @ (self.fit @ local)).reshape(*self.nodes.shape, 2)
 
     def _energy(self, u: Array, v: Array) -> Array:
-        """Return the energy of shear (a, b) that two fields (a, b, 5, 5, 2) have together."""
+        """Return the mutual shear energy (a, b) of two fields (a, b, 5, 5, 2)."""
         out = np.zeros(self.nodes.shape[:2])
         for right in (0, 1):
             for up in (0, 1):
@@ -107,10 +107,10 @@ class NestedGrid:
 
 
 def adjoint(finger: LinearFinger, displacement: Array, state: EquilibriumState) -> Array:
-    """Return the derivative of the ending's SED by forces on the nodes (nodes, 2) at fixed contact states [MPa mm/N].
+    """Return the derivative (nodes, 2) of the ending's SED with respect to nodal forces, at fixed contact states.
 
-    Where skin slips, its tangential force changes by mu times its normal force. There the normal component of the
-    adjoint is mu times the tangential one, against the friction. Skin that sticks does not move.
+    Its unit is MPa mm/N. Where skin slips, its tangential force changes by mu times its normal force, so the normal
+    component of the adjoint is mu times the tangential one, against the friction. Skin that sticks does not move.
     """
     goal = finger.ending.gradient(displacement)
     goal[finger.geometry.mesh.driven] = 0.0
@@ -129,9 +129,9 @@ def adjoint(finger: LinearFinger, displacement: Array, state: EquilibriumState) 
 def with_shares(
     scene: Scene, numbers: Array, on_nested: NestedState | NotConverged, steps: Steps | None
 ) -> NestedNumbers | NotConverged:
-    """Return the numbers of a nested state, with the shares of columns and rows where a finer mesh may be needed.
+    """Return the results of a nested state, with the shares of columns and rows where a finer mesh may be needed.
 
-    `numbers` (COUNT,) are the scene's on the mesh of the answer. A failure is returned as it is.
+    `numbers` (COUNT,) are the scene's results on the mesh of the answer. A failure is returned unchanged.
     """
     if isinstance(on_nested, NotConverged):
         return on_nested
@@ -204,7 +204,7 @@ def _lengths(mesh: FingerMesh) -> Array:
 
 
 def choose_steps(scene: Scene, finger: Finger[Patches], settled: EquilibriumState | None = None) -> Steps | None:
-    """Return the load steps that a scene needs, judged on one mesh, whose `settled` state may be known.
+    """Return the load steps that a scene needs, judged on one mesh, of which `settled` is the state if known.
 
     None where the state does not depend on its load path. Raises SolveFailure, Cancelled.
     """
@@ -216,9 +216,9 @@ def choose_steps(scene: Scene, finger: Finger[Patches], settled: EquilibriumStat
 
 
 def steps_of_press(scene: Scene, finger: Finger[Patches]) -> int:
-    """Return how many times the usual steps a load path needs whose end does not depend on them.
+    """Return the factor on the usual steps for a load path whose end does not depend on them.
 
-    The end of its press decides. Raises as `choose_steps`.
+    The end of its press determines it. Raises as `choose_steps`.
     """
     if scene.solve.course == "steady" or scene.friction.frictionless:
         return 1

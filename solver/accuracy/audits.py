@@ -19,7 +19,7 @@ FORCE_RESIDUAL = 1e-5  # largest relative difference from given forces
 MAX_RESIDUAL = 1e-4  # relative residual from which a state is refused
 WARNING_RESIDUAL = 1e-8  # relative residual from which a warning is given
 WARNING_PENETRATION = 1e-7  # penetration relative to the indentation, from which a warning is given
-State = TypeVar("State")  # with its displacement where that is not part of it
+State = TypeVar("State")  # a state, or one with its displacement
 
 
 def audits(
@@ -32,8 +32,8 @@ def audits(
 
     `equilibrium_x`, `equilibrium_y`: bone reaction plus contact force, relative to the contact force. `inner_forces`:
     largest residual at a free node, with the surface's force on nodes in contact, relative to the contact force.
-    `work_balance`: derivative of the stored energy by a factor of the displacement, against that of the work of the
-    contact forces, relative. At small strain that is Clapeyron's theorem. It concerns the state and not a load path.
+    `work_balance`: relative difference between the derivatives of the stored energy and of the contact forces' work
+    with respect to a factor on the displacement (Clapeyron's theorem at small strain). The load path has no part in it.
     `penetration`: of any node of the skin, relative to the indentation. `tension`: largest tension at a node in
     contact, relative to the largest normal force. `cone_violation`: |t| beyond min(mu p, tau_max) on the deformed
     length, relative to the largest normal force.
@@ -70,10 +70,10 @@ def audits(
 
 
 def force_residuals(scene: Scene, normal: float, tangential: float) -> dict[str, float]:
-    """Return by how much a state with these forces [N/mm] misses those that `scene` gives; nothing where it gives none.
+    """Return the relative errors of a state's forces [N/mm] against those that `scene` prescribes, if it does.
 
-    `normal_force_missed` by the force given, `drag_missed` by what friction could carry under it. Raises NotConverged
-    where that is more than a state found leaves over.
+    `normal_force_missed` is relative to the given force, `drag_missed` to the friction limit under it. Raises
+    NotConverged where either exceeds `FORCE_RESIDUAL`.
     """
     force, drag = scene.normal_force, scene.tangential_force
     if force is None:
@@ -99,8 +99,8 @@ def balance(
 ) -> tuple[State, dict[str, float]]:
     """Return a state and its audits after corrections until its imbalance is below `target`.
 
-    `correct` returns a corrected state with its audits, None where there is none. A correction that does not halve the
-    imbalance is the last, and is not taken (Higham 2002, Accuracy and Stability of Numerical Algorithms, chapter 12).
+    `correct` returns a corrected state with its audits, or None. The first correction that does not halve the imbalance
+    is discarded, and ends the loop (Higham 2002, Accuracy and Stability of Numerical Algorithms, chapter 12).
     """
     while (before := imbalance(checks)) > target:
         corrected = correct(state, checks)
@@ -145,7 +145,7 @@ def round_off_warnings(checks: Mapping[str, float]) -> tuple[str, ...]:
 def inside_out_warning(checks: Mapping[str, float]) -> str:
     """Return a warning where tissue is turned inside out, else "".
 
-    Small strain has finite stiffness and energy there, which no tissue has.
+    Unlike tissue, the small-strain model has finite stiffness and energy there.
     """
     if checks["smallest_det_F"] > 0.0:
         return ""
@@ -166,14 +166,14 @@ def course_audits(newton: Newton, states: Sequence[EquilibriumState], *, relaxin
     `course_least_dissipation`: smallest dissipation by friction in a step, never negative.
 
     Relaxing tissues dissipate too, and forces within a step depend on the past. There `course_viscous_work` takes the
-    place of the first two: bone work less friction less the energy stored at the end. It is positive but for the error
+    place of the first two: bone work less friction less the energy stored at the end. It is positive, up to the error
     of the steps.
     """
     reaction = np.array([state.reaction for state in states])  # (m, k, 2)
     skin = np.array([state.skin_positions(newton.condensed) for state in states])
     load = np.array([[state.load.travel, state.load.depth] for state in states])
     mean, motion = (reaction[1:] + reaction[:-1]) / 2.0, np.diff(skin, axis=0)
-    slip = motion - np.diff(load, axis=0)[:, None]  # relative to the surface; along y towards it, negative
+    slip = motion - np.diff(load, axis=0)[:, None]  # relative to the surface; negative along y towards it
     bone = float(np.sum(mean.sum(axis=1) * np.diff(load, axis=0)))
     dissipation = -float(np.sum(mean[..., 0] * slip[..., 0]))
     friction = -np.sum(reaction[1:, :, 0] * slip[..., 0], axis=1)

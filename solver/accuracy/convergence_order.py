@@ -1,14 +1,14 @@
-"""The power of the element size with which the errors of a scene fall, and where there is none.
+"""The order of convergence of a scene's errors with the element size, and the scenes that have none.
 
 Errors of quadratic elements beneath a contact fall at least with the square of the element size. At a straight or
-convex corner of held and free tissue displacements follow r^a, with a of 1/2 or more (Williams 1952, J. Appl. Mech. 19,
-526), and energies err by the power 2 a. Such a corner lies where bone meets the free cut.
+convex corner of held and free tissue, displacements follow r^a with a >= 1/2 (Williams 1952, J. Appl. Mech. 19, 526),
+and errors of the energy follow the power 2 a. Such a corner lies where bone meets the free cut.
 
 At finite strain that corner is squeezed further on each finer mesh. A free face folds where it is squeezed along itself
-below a certain stretch (Biot 1963, Appl. Sci. Res. A 12, 168). Where one element alone falls below it, the mesh does
-not resolve a fold: the corner counts. Where more do, the cut folds. Nothing sets the size of such folds, so that finer
-meshes come to others, and no error is known. The same holds where a stiff layer wrinkles on a soft one (Allen 1969,
-Analysis and Design of Structural Sandwich Panels, chapter 8): its equilibrium without wrinkles is unstable.
+below a critical stretch (Biot 1963, Appl. Sci. Res. A 12, 168). Where only one element falls below it, the mesh does
+not resolve a fold, and the corner sets the order. Where more do, the cut folds. Such folds have no intrinsic size:
+finer meshes fold differently, and no error is known. The same is true where a stiff layer wrinkles on a soft one (Allen
+1969, Analysis and Design of Structural Sandwich Panels, chapter 8): its equilibrium without wrinkles is unstable.
 """
 
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ SECOND_ORDER = {"small": 100.0, "finite": 6.0}
 
 
 def richardson_factor(order: float) -> float:
-    """Return the error of a number on a mesh by what halving its elements changes, the sum of a geometric series."""
+    """Return the ratio of a mesh's error to the change by halving its elements: the sum of a geometric series."""
     return 1.0 / (1.0 - 2.0**-order)
 
 
@@ -41,8 +41,8 @@ def order_of(finger: Finger[Any], state: EquilibriumState) -> float:
     """Return the order of convergence that an estimate assumes, from the `state` on its nested mesh.
 
     It is `CORNER_ORDER` where the element at the corner of bone and cut is squeezed, where neighbouring tissues differ
-    in stiffness by more than in trials that show second order, or where skin stiffens as it stretches. Raises Folds,
-    where tissue wrinkles too.
+    in stiffness by more than in trials that show second order, or where skin stiffens as it stretches. Raises Folds
+    where the cut folds or tissue wrinkles.
     """
     scene = finger.scene
     squeezed = _check_cut(finger, state) if isinstance(finger, FiniteFinger) and scene.finger.cut == "free" else False
@@ -54,9 +54,9 @@ def order_of(finger: Finger[Any], state: EquilibriumState) -> float:
 
 
 def _check_cut(finger: FiniteFinger, state: EquilibriumState) -> bool:
-    """Return whether an element beside the free cut of a nested mesh is squeezed below the stretch at which faces fold.
+    """Return whether an element at the free cut of a nested mesh is squeezed below the stretch at which faces fold.
 
-    Raises Folds where more than one is, at one end.
+    Raises Folds where more than one is at either end.
     """
     mesh = finger.body.mesh
     columns = np.arange(len(mesh.elements)).reshape(len(finger.geometry.arcs) - 1, -1)
@@ -79,7 +79,7 @@ def _critical_stretches(materials: Materials) -> Array:
 
 _ROUND_OFF = 1e-12  # relative, of a stiffness
 TRIAL_RATIO = 100.0  # largest ratio of stiffnesses of neighbouring tissues in the trials where estimates hold [-]
-TRIAL_DEPTH = 0.5  # deepest presses at finite strain in those trials, by the thickness of the tissue [-]
+TRIAL_DEPTH = 0.5  # deepest presses at finite strain in those trials, relative to the tissue's thickness [-]
 
 
 def trial_warnings(scene: Scene, depth: float) -> Iterator[str]:
@@ -103,7 +103,7 @@ def trial_warnings(scene: Scene, depth: float) -> Iterator[str]:
 
 @lru_cache(maxsize=32)
 def _stiffness_ratio(materials: Materials) -> tuple[float, str, str]:
-    """Return the largest ratio of stiffnesses of neighbouring tissues without its round-off, the stiffer and softer."""
+    """Return the largest stiffness ratio of neighbouring tissues, less round-off, and the stiffer and softer one."""
     stiffness = {name: moduli.engineering[0] for name, moduli in zip(TISSUES, settled_moduli(materials), strict=True)}
     pairs = [pair for outer, inner in pairwise(TISSUES[:-1]) for pair in ((outer, inner), (inner, outer))]
     ratio, stiff, soft = max((stiffness[a] / stiffness[b], a, b) for a, b in pairs)

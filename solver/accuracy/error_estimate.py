@@ -1,19 +1,19 @@
-"""Estimate the errors of a scene's numbers from its nested mesh and from moving the edges of contact.
+"""Estimate the errors of a scene's results from its nested mesh and from moving the edges of contact.
 
 The scene is solved on the mesh H of the answer and on its nested mesh h, which divides every element into four. Errors
 of quadratic elements beneath a contact fall at least with the square of the element size. The error on H is therefore
 at most 1 + 1/4 + 1/16 + ... = 4/3 of the change from H to h (Roache 1994). At a corner where stiff tissue holds soft
-tissue they may fall with the first power only, and the error is at most 1 + 1/2 + 1/4 + ... = 2 of the change. The
-value on h errs by the series without its first term: the error is smaller by the change.
+tissue, errors may fall only with the first power, and the error is at most 1 + 1/2 + 1/4 + ... = 2 of the change. The
+error on h is the series without its first term.
 
 Two meshes may agree by chance on where contact states change: an edge of contact, of stick or of slip at the bound lies
 anywhere between two nodes. Each edge is moved by one node of h to either side at otherwise fixed contact states, and
-the linearised body is solved again. A number depends on the place of an edge by a parabola about the true place, so
-that a third of the larger change counts. Their sum is the bound for one number.
+the linearised body is solved again. A result is a parabola of an edge's position about the true one, so that a third of
+the larger change counts. The sum over the edges bounds their part of the error.
 
 Much of the error is common to all surfaces of one finger and cancels in their differences. The rest is estimated in the
-same way, but for edges: the worst pair of surfaces counts, and edges of two surfaces err independently, so that their
-changes are added as squares.
+same way for the worst pair of surfaces. Only the edges differ: those of two surfaces err independently, so that their
+changes add as squares.
 """
 
 from collections.abc import Callable, Sequence
@@ -37,13 +37,13 @@ from solver.quantities import NAMES
 from solver.scene import Scene
 from solver.scene.tables import USUAL_TOLERANCE
 
-SHIFT, _WIDTH = 4, 5  # places of the bone's shift and of the contact's width among the numbers
+SHIFT, _WIDTH = 4, 5  # indices of the bone's shift and of the contact's width in `all_numbers`
 
 
 def half_width(change: Array, edges: Array, order: float = ORDER, share: Array | None = None) -> Array:
-    """Return the error estimate of numbers (...) from their `change` to the nested mesh.
+    """Return the error estimate of results (...) from their `change` to the nested mesh.
 
-    `edges` (m, ...) are their changes there as one edge of contact after the other moves, of which a `share` counts, by
+    `edges` (m, ...) are their changes on the nested mesh as each edge of contact moves. A `share` of these counts, by
     default `edge_share`. Errors fall with the power `order` of the element size.
     """
     return richardson_factor(order) * np.abs(change) + (edge_share(order) if share is None else share) * edges.sum(
@@ -52,11 +52,11 @@ def half_width(change: Array, edges: Array, order: float = ORDER, share: Array |
 
 
 def edge_share(order: float) -> float:
-    """Return the share of a number's change that counts as an edge of contact moves by one node of the nested mesh.
+    """Return the counting share of a result's change as an edge of contact moves by one node of the nested mesh.
 
-    The number depends on the place of the edge by a parabola about its true place, at most one such node away on the
-    mesh and half a node on the nested one. So its errors there lie between 0 and the change c, and 0 and c/4. The
-    extrapolated error has the part r E_h + (1 - r) E_H of them, r being `richardson_factor`.
+    The result is a parabola of the edge's position about the true one, which is at most one such node away on the mesh
+    and half a node on the nested one. So the errors E_H and E_h lie between 0 and the change c, and between 0 and c/4.
+    They add r E_h + (1 - r) E_H to the extrapolated error, r being `richardson_factor`.
 
     >>> round(edge_share(2.0), 4), edge_share(1.0)
     (0.3333, 1.0)
@@ -66,30 +66,30 @@ def edge_share(order: float) -> float:
 
 
 def _edge_shares(order: float) -> Array:
-    """Return the shares (COUNT,); the contact's width follows its edges by a line, to either side of its true value."""
+    """Return the shares (COUNT,); the contact's width is linear in its edges, to either side of its true value."""
     factor = richardson_factor(order)
     return np.where(np.arange(COUNT) == _WIDTH, factor / 2.0 + factor - 1.0, edge_share(order))
 
 
 PARTS = np.array([0.48, 0.68])  # of the usual steps: 12 and 17 of 25, about a half and two thirds
-MAX_STEP_FACTOR = 16  # times the usual steps: a second's work on a coarse mesh at small strain
-STEP_ERROR_SHARE = 0.3  # of a tolerance, for the error of the steps: the mesh, which costs more, has the rest
+MAX_STEP_FACTOR = 16  # times the usual steps: one second on a coarse mesh at small strain
+STEP_ERROR_SHARE = 0.3  # of a tolerance, for the error of the steps; the mesh, which costs more, gets the rest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Steps:
-    """The load steps of one path and their error. Numbers are those of `all_numbers` (c,).
+    """The load steps of one path and the error by them, for the c results of `all_numbers`.
 
     A press with friction, or a drag below the friction limit, depends on its load path: a point sticks where it first
-    touches, which is known to within a step. The error falls on average in proportion to the number of steps, and
-    irregularly. It is nearly the same on every mesh, and is measured on a coarse one by two paths of fewer steps. With
-    an error c after the usual steps and c/p after a part p of them, the end changes by c (1/p - 1). Either path may
-    agree with the usual one by chance, so that both estimates of c are added. A settled slide has no such error.
+    touches, which is known to within a step. On average the error is inversely proportional to the number of steps, but
+    it falls irregularly. It is nearly the same on every mesh, and is measured on a coarse one by two paths of fewer
+    steps. With an error c after the usual steps and c/p after a part p of them, the end changes by c (1/p - 1). Either
+    path may agree with the usual one by chance, so that both estimates of c are added. Full slip has no such error.
     """
 
-    factor: int  # their number by the usual one
-    excess: Array  # (c,) of the numbers after the usual steps over those after many
-    bound: Array  # (c,) of its size
+    factor: int  # ratio of their number to the usual number
+    excess: Array  # (c,) results after the usual steps less those after many
+    bound: Array  # (c,) of the magnitude of `excess`
 
     @staticmethod
     def of(usual: Array, fewer: Array, tolerance: float | None) -> "Steps":
@@ -107,26 +107,26 @@ class Steps:
 
     @property
     def error(self) -> Array:
-        """Error of the numbers (c,) from the finite number of steps."""
+        """Error of the results (c,) by the finite number of steps."""
         return self.bound / self.factor
 
     def extrapolate(self, usual: Array) -> Array:
-        """Extrapolate numbers (c,) after the usual steps to these."""
+        """Extrapolate results (c,) after the usual steps to the steps of this path."""
         return usual - (1.0 - 1.0 / self.factor) * self.excess
 
 
 class Errors(NamedTuple):
-    """Error estimates: relative, except for the shift. None for numbers that are given or do not exist."""
+    """Error estimates, relative except for the shift; None for results that are given or do not exist."""
 
     sed: float
     corrected: float  # of the SED on the nested mesh
     normal: float | None
-    tangential: float | None  # 0 where nothing rubs
+    tangential: float | None  # 0 without friction
     indentation: float | None
     shift: float | None  # [mm]
     width: float | None  # of the contact
-    point: float  # of the SED in the ending's middle
-    responses: Array  # (q,) of each quantity at the ending, in its own unit; nan where nothing is known
+    point: float  # of the SED at the ending's middle
+    responses: Array  # (q,) of each quantity at the ending, in the quantity's unit; nan where unknown
 
 
 def edge_changes(
@@ -191,7 +191,7 @@ def _move_edges(
     """
     x = np.ascontiguousarray(state.skin_positions(newton.condensed)[:, 0])
     edges = np.flatnonzero(np.diff(state.state)).tolist()
-    reuse = newton.condensed.equilibrium is state.u  # the tangent of the last iteration is there still
+    reuse = newton.condensed.equilibrium is state.u  # the last iteration's tangent is still in memory
     solvable = newton.linearise(state, state.load, x, 0, forces, reuse=reuse)
     is_single = np.count_nonzero(state.touching) == 1
     return [
@@ -248,7 +248,7 @@ def responses(numbers: Array, errors: Errors) -> dict[str, Response]:
 
 
 def row_errors(row: Array, nested: NestedNumbers | None) -> Array:
-    """Return the errors of the SED of a row of receptors `row` (r,), relative (r,); nan where nothing is known."""
+    """Return the relative errors (r,) of the SED of a row of receptors `row` (r,); nan where unknown."""
     if nested is None:
         return np.full(len(row), np.nan)
     error = half_width(nested.row - row, nested.row_edge_changes, nested.order)
@@ -256,7 +256,7 @@ def row_errors(row: Array, nested: NestedNumbers | None) -> Array:
 
 
 def _without_prescribed(scene: Scene, estimates: Errors) -> Errors:
-    """Return the errors without those of prescribed numbers, and of the drag where there is no friction."""
+    """Return the errors, None for prescribed results and 0 for the drag without friction."""
     by_force, by_drag = scene.normal_force is not None, scene.loading.dragged
     rubs = not scene.friction.frictionless
     return estimates._replace(
@@ -267,16 +267,16 @@ def _without_prescribed(scene: Scene, estimates: Errors) -> Errors:
     )
 
 
-COMPARED = ("SED", "normal force", "drag", "indentation")  # the first four of all numbers
-WARNING_SHARE = 0.05  # error of differences by their range from which on there is a warning
-LEAST_RANGE = 1e-5  # smallest range by the numbers: smaller errors of differences give no warning
+COMPARED = ("SED", "normal force", "drag", "indentation")  # the first four of `all_numbers`
+WARNING_SHARE = 0.05  # error of differences relative to their range, from which a warning is given
+LEAST_RANGE = 1e-5  # smallest range relative to the values: smaller errors of differences give no warning
 SENSOR_RESOLUTION = 1e-3  # relative, of a force or depth
 
 
 def compared_sets(scenes: Sequence[Scene]) -> list[list[int]]:
-    """Return the sets of scenes that are compared: two or more surfaces, pressed and moved alike.
+    """Return the sets of scenes that are compared: two or more surfaces under the same loading.
 
-    Scenes with quick evidence belong to none. They are variants of one surface, whose differences come from
+    Scenes with quick evidence belong to no set. They are variants of one surface, whose differences come from
     `solver.response.nearby`.
     """
     sets: dict[object, list[int]] = {}
@@ -287,10 +287,10 @@ def compared_sets(scenes: Sequence[Scene]) -> list[list[int]]:
 
 
 class ContrastError(NamedTuple):
-    """The error estimate of differences between surfaces by their range."""
+    """The error estimate of differences between surfaces, relative to their range."""
 
-    share: float  # in SED, at worst [-]
-    warning: str = ""  # a sentence where that is too much of it, or of a force or depth
+    share: float  # of the SED, for the worst pair [-]
+    warning: str = ""  # a sentence where the share of the SED, a force or the depth is too large
 
 
 def contrast_error(predictions: Sequence[Prediction]) -> ContrastError:
@@ -333,10 +333,10 @@ Numbers = Callable[[Newton, EquilibriumState], Array]
 
 
 class ErrorInterval(NamedTuple):
-    """Numbers (n,) of a state, each in its own unit."""
+    """Results (n,) of a state, each in its unit."""
 
     value: Array
-    corrected: Array  # the same on the nested mesh, the best value there is
+    corrected: Array  # value on the nested mesh, the best one
     error: Array  # half width of the interval about either
 
 

@@ -1,8 +1,8 @@
 """Effects that the model omits, each with an estimate of its size for the scene.
 
 With `[solve] evidence = "measured"` the scene is solved again on a coarse mesh, with an effect and without it. Most of
-the mesh error cancels in the difference. A meshed bone leaves the mesh of the soft tissues as it is. Finite strain has
-other meshes, so that such a difference must exceed the errors.
+the mesh error cancels in the difference. A meshed bone does not change the mesh of the soft tissues. Finite strain has
+other meshes, so that its difference must exceed the errors.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -59,10 +59,10 @@ def _describe_support(scene: Scene) -> str:
 def model(
     scene: Scene, finger: Finger[Patches], state: EquilibriumState, displacement: Array, width: float
 ) -> dict[str, Any]:
-    """Return the model and its omitted effects as plain data; `width` is that of the contact [mm].
+    """Return the model and its omitted effects as plain data; `width` is the width of the contact [mm].
 
     Every entry of `left_out` has `estimate`, the relative change of the SED by the effect or a lower bound of it,
-    `from`, the numbers of this scene behind it, and `how`, the method.
+    `from`, the scene's values that it is based on, and `how`, the method.
     """
     slide = sideways(displacement, finger.geometry.mesh.skin[state.touching])
     small = {"finite strain": _finite_strain(finger, displacement)} if isinstance(finger, LinearFinger) else {}
@@ -219,7 +219,7 @@ def _overstress_after(duration: float, terms: Sequence[tuple[float, float]]) -> 
 
 
 def slide_duration(scene: Scene, drift: float) -> float:
-    """Return how long the bone slides until the slide has settled [s]: by the skin's own `drift` along it [mm]."""
+    """Return the duration [s] of a slide until it settles: the bone travels by the skin's displacement `drift` [mm]."""
     return drift / scene.loading.speed if scene.loading.direction else 0.0
 
 
@@ -268,7 +268,7 @@ def measure_differences(prediction: Prediction, answers: Answers) -> Prediction:
 
 
 def with_left_out(prediction: Prediction, left_out: Mapping[str, Any], start: float) -> Prediction:
-    """Return `prediction` with new entries `left_out` and their warnings; `start` is when the work on them began."""
+    """Return `prediction` with new entries `left_out` and their warnings; the work on them began at `start` [s]."""
     usual = warnings(prediction.scene, prediction.model["left_out"])
     remaining = tuple(warning for warning in prediction.warnings if warning not in usual)
     return replace(
@@ -293,7 +293,7 @@ def _differences(scene: Scene, base: Prediction, answers: Answers) -> dict[str, 
 
 
 def _with_meshed_bone(scene: Scene, answers: Answers) -> Answer | SceneError:
-    """Return the answer of a scene with its bone meshed, whose stiffness may be out of proportion to the tissues'."""
+    """Return the answer of a scene with a meshed bone, or the SceneError of a bone too stiff for the tissues."""
     try:
         return answers((replace(scene, finger=replace(scene.finger, bone="meshed")),))[0]
     except SceneError as error:

@@ -22,10 +22,10 @@ from solver.prediction import Prediction
 from solver.scene import Scene
 from solver.scene.tables import Relaxation, SceneError
 
-_MARGIN = 4.0  # relative to the indentation: height of the undeformed skin up to which contact is considered
-# Elements to a tip radius, and load steps of the press and as many of the slide. Against 16 steps at a fineness of 5,
-# estimates of 42 scenes at small strain differ by 4 % of the SED at most. Against 8 at a fineness of 4, those of 60 at
-# finite strain differ by 5 % of it or a tenth of themselves, but for four, by a sixth: their weights are assumed.
+_MARGIN = 4.0  # height of the undeformed skin up to which contact is considered, relative to the indentation
+# Elements per tip radius, and load steps of the press and of the slide each. Compared with 16 steps at a fineness of 5,
+# estimates of 42 small-strain scenes differ by at most 4 % of the SED. Compared with 8 at a fineness of 4, those of 60
+# finite-strain scenes differ by 5 % of it or by a tenth of the estimate; four, with assumed weights, by a sixth.
 _FINENESS = 2.0
 _STEPS = {"small": 1, "finite": 2}
 
@@ -34,14 +34,14 @@ _STEPS = {"small": 1, "finite": 2}
 class ResidualOverstress:
     """The overstress that remains, and its instant."""
 
-    part: float  # surplus of the ending's SED by the settled SED [-]
-    slide_s: float  # since the slide began [s]
+    part: float  # surplus of the ending's SED, relative to the settled SED [-]
+    slide_s: float  # time since the slide began [s]
 
 
 def relaxing_scene(scene: Scene) -> Scene | None:
-    """Return the scene with relaxing tissues: its own Prony series, or literature's with its moduli as long-term ones.
+    """Return the scene with relaxing tissues: with its Prony series, or with the literature's and its moduli long-term.
 
-    Bulk moduli do not relax. None for tissue too compressible for that, or too stiff for a scene.
+    Bulk moduli do not relax. Returns None for tissue too compressible for that, or too stiff for a scene.
     """
     if scene.materials.relax:
         return scene

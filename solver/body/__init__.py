@@ -19,11 +19,11 @@ MAX_CONDITION = 1e14  # product of the largest entries of stiffness and complian
 
 
 class CondensedBody(Protocol):
-    """A body linearised at a state and condensed to its skin, k nodes of it."""
+    """A body linearised at a state and condensed to the k nodes of its skin."""
 
     constant: bool  # whether all states share one stiffness, so that one linear solve is exact
     bulk: float  # largest ratio of first Lamé constant to shear modulus [-]
-    length_scale: float  # by which displacements count as small or large [mm]
+    length_scale: float  # relative to which displacements are small or large [mm]
     held: Narrow  # (k,) directions in which a node is held: 0, HELD_X, HELD_Y or their sum
     middle: Narrow  # (k,) 1 at the middle of an edge whose length follows the deformed skin, else 0
     fixed_length: Array  # (k,) tributary length of each node, where the deformation does not change it [mm]
@@ -91,7 +91,7 @@ class Body(Protocol):
         """Return the internal forces (n, 2) at `displacement` (n, 2) [N/mm]."""
 
     def internal_work(self, displacement: Array) -> float:
-        """Return the derivative of the stored energy by a factor of `displacement` (n, 2), at 1 [N]."""
+        """Return the derivative of the stored energy with respect to a factor on `displacement` (n, 2), at 1 [N]."""
 
     def smallest_det(self, displacement: Array) -> float:
         """Return the smallest det F [-] at `displacement` (n, 2); not positive where tissue is inside out."""
@@ -117,7 +117,7 @@ class CondensedLinear:
 
     @property
     def compliance(self) -> Array:
-        """Do as `CondensedBody` says, 0 for held unknowns. Raises LinAlgError where the stiffness is singular."""
+        """The bordered inverse of `CondensedBody`, 0 for held unknowns. Raises LinAlgError for a singular stiffness."""
         if self._compliance is None:
             self._compliance = self._inverse()
         return self._compliance
@@ -145,7 +145,7 @@ class CondensedLinear:
     def with_load(self, load: Array) -> "CondensedLinear":
         """Return the same body under another dead `load` (2 k,) [N/mm]."""
         body = copy(self)
-        body.load, body.force, body._compliance = load, -load, self.compliance  # noqa: SLF001 - of its own kind
+        body.load, body.force, body._compliance = load, -load, self.compliance  # noqa: SLF001 - same class
         return body
 
     def undeformed(self) -> tuple[Array, Array]:
@@ -160,11 +160,11 @@ class CondensedLinear:
         """Return the displacements (k, 2) under the dead loads and forces `reaction` (k, 2) of the surface."""
         return self._displacement_by(self.load + reaction.ravel())
 
-    def stored_energy(self, u: Array, reaction: Array) -> float:  # noqa: ARG002 - tissues that relax may be elsewhere
+    def stored_energy(self, u: Array, reaction: Array) -> float:  # noqa: ARG002 - `u` of relaxing tissues may differ
         """Return the energy stored once the body is relaxed under forces `reaction` (k, 2) [N mm per mm]."""
         return 0.5 * float(np.sum(reaction * self.displacement_under(reaction)))
 
-    def work(self, path: Sequence[Array], trapezoid: float) -> float:  # noqa: ARG002 - as every body is asked
+    def work(self, path: Sequence[Array], trapezoid: float) -> float:  # noqa: ARG002 - part of the protocol
         """Return `trapezoid`: forces grow in proportion to displacements, so that the rule is exact."""
         return trapezoid
 
@@ -172,7 +172,7 @@ class CondensedLinear:
         """Return the positions of the skin's nodes (k, 2) at displacements `u` (k, 2) [mm]."""
         return self.rest + u
 
-    def linearise(self, u: Array, pressure: Array) -> bool:  # noqa: ARG002 - as every body is asked
+    def linearise(self, u: Array, pressure: Array) -> bool:  # noqa: ARG002 - part of the protocol
         """Set `force` at a state; the stiffness is constant."""
         return self.relinearise(u)
 
@@ -242,11 +242,11 @@ VALUES = Q2P1.shape(Q2P1.points)[0]  # (9 points, 9 nodes)
 
 
 class ProbeData(NamedTuple):
-    """Probes with the data of their elements, which no displacement changes."""
+    """Probes with the constant data of their elements."""
 
     probes: "Probes"
     hosts: Indices  # (m,) elements that hold probes
-    number: Indices  # (p,) which of these elements holds each probe
+    number: Indices  # (p,) index in `hosts` of the element that holds each probe
     modes: Array  # (p, 3) orthonormal volume modes at the probes
     constants: Array  # (5, p) shear modulus, first Lamé constant, stiffening exponent, tangent of the skin x, y
 
@@ -332,7 +332,7 @@ def integrate_elements(
 
 
 def held_directions(mesh: Mesh) -> Narrow:
-    """Return in which directions each node of the skin is held (k,): 0, HELD_X, HELD_Y or their sum."""
+    """Return the directions in which each node of the skin is held (k,): 0, HELD_X, HELD_Y or their sum."""
     return (mesh.driven[mesh.skin] @ np.array([HELD_X, HELD_Y])).astype(np.int32)
 
 

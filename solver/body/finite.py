@@ -61,12 +61,12 @@ class FiniteBody(MeshElements):
         """Number of unknowns after the centres are eliminated."""
         return self.plan.size
 
-    def displacement(self, u: Array, only: Indices | None = None) -> Array:  # noqa: ARG002 - all nodes are there anyway
-        """Do as `Body` says."""
+    def displacement(self, u: Array, only: Indices | None = None) -> Array:  # noqa: ARG002 - `u` has all nodes
+        """Return `u`, the displacements (nodes, 2, ...) of all nodes."""
         return u
 
     def recover_increments(self, skin: Array) -> Array:
-        """Do as `Body` says, with the last tangent."""
+        """Return the increments (nodes, 2, c) of all nodes for the skin's (2 k, c), with the last tangent."""
         out = np.zeros((*self.mesh.nodes.shape, skin.shape[1]))
         inside, recovery = self.condensed.inside, self.condensed.system.recovery_matrix[:, :, :16].copy()
         every = np.ones(len(self.plan.start), bool)
@@ -79,7 +79,7 @@ class FiniteBody(MeshElements):
         return np.eye(2) + self.gradient(u)
 
     def smallest_det(self, displacement: Array) -> float:
-        """Do as `Body` says, at the quadrature points."""
+        """Return the smallest det F at the quadrature points [-]; not positive where tissue is inside out."""
         return float(np.linalg.det(self.deformation(displacement)).min())
 
     def pressure(self, u: Array) -> Array:
@@ -100,11 +100,11 @@ class FiniteBody(MeshElements):
         return self._energy(H).imag / IMAGINARY
 
     def internal_work(self, displacement: Array) -> float:
-        """Do as `Body` says, independently of the stresses."""
+        """Return the derivative of the stored energy as in `Body`, independently of the stresses [N]."""
         return self.energy_slope(displacement, displacement)
 
     def forces(self, displacement: Array) -> Array:
-        """Do as `Body` says."""
+        """Return the internal forces (nodes, 2) at `displacement` (nodes, 2) [N/mm]."""
         H = self.gradient(displacement)
         log, volume = self._volume(H)
         inverse, exceeds = _inverse_and_excess(H)
@@ -117,12 +117,12 @@ class FiniteBody(MeshElements):
         return self.mesh.assemble((gradient @ np.swapaxes(stress, -1, -2)).sum(axis=1))
 
     def gradient(self, u: Array) -> Array:
-        """Return F - 1 (e, 9, 2, 2), which keeps the digits that F would lose."""
+        """Return F - 1 (e, 9, 2, 2), which keeps digits that F would lose."""
         local = self.mesh.local(u)
         return np.stack([self.elements.grad_x @ local, self.elements.grad_y @ local], axis=-1)
 
     def volume_modes(self, element: Indices, local: Array) -> Array:
-        """Do as `MeshElements` says."""
+        """Return the least-squares modes (m, 3, ...) of ln J, as `MeshElements` defines them."""
         slopes = np.stack([self.elements.grad_x[element], self.elements.grad_y[element]])
         gradient = slopes @ local.reshape(len(element), 9, -1)  # (2, m, q, 2 c)
         x, y = np.moveaxis(gradient.reshape(2, len(element), -1, 2, local[0, 0, 0].size), 3, 1)
@@ -168,7 +168,7 @@ class CondensedFinite:
         count = len(body.elements.nodes)
         self.body, self.constant, self.length_scale = body, False, body.mesh.length_scale
         self.definite = True
-        self.load = np.zeros(body.size)  # dead loads by unknowns
+        self.load = np.zeros(body.size)  # dead loads on all unknowns
         self.all_forces = np.zeros(body.size)  # internal forces of all unknowns, less the dead loads
         self.inside = Elimination(body.plan)
         self.system = ElementSystem(
@@ -233,12 +233,12 @@ class CondensedFinite:
         largest = self._advance(BodyState(u, pressure), inner, scale, after)
         return after.u, after.pressure, largest
 
-    def stored_energy(self, u: Array, reaction: Array) -> float:  # noqa: ARG002 - as every body is asked
+    def stored_energy(self, u: Array, reaction: Array) -> float:  # noqa: ARG002 - part of the protocol
         """Return the energy stored in the body at `u` (nodes, 2) [N mm per mm]."""
         return self.body.energy(u)
 
     def work(self, path: Sequence[Array], trapezoid: float) -> float:
-        """Do as `CondensedBody` says, by Simpson's rule, with the internal forces at the mean displacements."""
+        """Return the work by Simpson's rule, with the internal forces at the mean displacements [N mm per mm]."""
         halfway = (self.body.energy_slope((before + after) / 2.0, after - before) for before, after in pairwise(path))
         return (trapezoid + 2.0 * sum(halfway)) / 3.0
 

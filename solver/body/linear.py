@@ -19,7 +19,7 @@ from solver.linalg import ElementSubset, Elimination, symbolic_factorization
 from solver.mesh import GAUSS_4, Q2P1, Mesh, jacobians, line
 from solver.quantities import QUANTITIES, SED
 
-CondensedLoad = tuple[Array, Array]  # a load after forward elimination (n,), and centres' displacements (e, 2) by it
+CondensedLoad = tuple[Array, Array]  # a load after forward elimination (n,), and centres' displacements (e, 2) under it
 
 
 class Elastic(MeshElements):
@@ -27,7 +27,7 @@ class Elastic(MeshElements):
 
     @cached_property
     def stiffness(self) -> Array:
-        """Element stiffnesses (e, 18, 18) of 2 G eps:eps + lambda theta^2 [N/mm per mm], theta of three volume modes.
+        """Element stiffnesses (e, 18, 18) of 2 G eps:eps + lambda theta^2 [N/mm per mm], theta in three volume modes.
 
         This is the mixed form with its three pressure modes lambda theta eliminated, which is exact for Hooke's law.
         """
@@ -46,7 +46,7 @@ class Elastic(MeshElements):
     def forces(self, local: Array) -> Array:
         """Return the internal forces (e, 9, 2) [N/mm] of the elements at displacements `local` (e, 9, 2).
 
-        The translation of an element is taken out, since it would drown small strains in round-off.
+        The translation of an element is subtracted, since it would drown small strains in round-off.
         """
         return (self.stiffness @ (local - local[:, 8:]).reshape(-1, 18, 1)).reshape(local.shape)
 
@@ -56,7 +56,7 @@ class Elastic(MeshElements):
 
 
 class LinearElimination:
-    """The factors of a body at small strain: its static condensation to x, y of its k nodes of skin."""
+    """The factors of a body at small strain, and its static condensation to x, y of the k nodes of its skin."""
 
     def __init__(self, mesh: Mesh, materials: Sequence[Elasticity]) -> None:
         """Assemble `mesh` with `materials` by region, and eliminate all unknowns but the skin's.
@@ -187,7 +187,7 @@ class LinearBody:
 
     @property
     def centre(self) -> Array:
-        """Do as `Body` says."""
+        """Origins (e, 2) of the elements' pressure modes [mm]."""
         return self.elastic.centre
 
     def unit_displacements(self) -> Array:
@@ -220,20 +220,20 @@ class LinearBody:
         return self.condensed.with_load(self.elimination.skin_load(load)), recover
 
     def recover_increments(self, skin: Array) -> Array:
-        """Do as `Body` says."""
+        """Return the increments (nodes, 2, c) of all nodes by back substitution of the skin's (2 k, c)."""
         return self.displacement(skin.reshape(-1, 2, skin.shape[1]))
 
     def forces(self, displacement: Array) -> Array:
-        """Do as `Body` says."""
+        """Return the internal forces (nodes, 2) at `displacement` (nodes, 2) [N/mm]."""
         return self.mesh.assemble(self.elastic.forces(self.mesh.local(displacement)))
 
     def internal_work(self, displacement: Array) -> float:
-        """Do as `Body` says."""
+        """Return the work of the internal forces on `displacement` (nodes, 2), twice the stored energy [N]."""
         local = self.mesh.about_centre(displacement)
         return float(np.sum(local * self.elastic.forces(local)))
 
     def smallest_det(self, displacement: Array) -> float:
-        """Do as `Body` says, at the corners of elements, where strains are largest."""
+        """Return the smallest det F [-] at the corners of elements, where strains are largest."""
         return float(determinant(self._at_corners(displacement)).min())
 
     def stretches(self, displacement: Array) -> Array:
@@ -265,7 +265,7 @@ class LinearPatches(Patches):
     quantities = tuple(quantity.small for quantity in QUANTITIES)
 
     def average(self, displacement: Array) -> Array:
-        """Do as `Patches` says."""
+        """Return the SED averaged over each ending (r, ...) [MPa], from quadratic forms of the displacements."""
         element, patch, form = self._energy_forms
         local = self.elements.mesh.about_centre(displacement, element).reshape(len(element), 18, -1)
         energy = np.einsum("mic,mic->mc", local, form @ local)
@@ -274,7 +274,7 @@ class LinearPatches(Patches):
         return (total / self.endings.areas[:, None]).reshape(-1, *displacement.shape[2:])
 
     def gradient(self, displacement: Array) -> Array:
-        """Return the derivative (nodes, 2) of the first ending's SED by the `displacement` (nodes, 2) [MPa/mm]."""
+        """Return the gradient (nodes, 2) of the first ending's SED at `displacement` (nodes, 2) [MPa/mm]."""
         element, patch, form = self._energy_forms
         mesh, first = self.elements.mesh, patch == 0
         local = mesh.about_centre(displacement, element[first]).reshape(-1, 18, 1)
@@ -303,7 +303,7 @@ class LinearPatches(Patches):
         form = np.empty((len(first), 9, 2, 9, 2))  # of eps:eps
         form[:, :, 0, :, 0], form[:, :, 0, :, 1] = xx + yy / 2.0, yx / 2.0
         form[:, :, 1, :, 0], form[:, :, 1, :, 1] = np.swapaxes(yx, 1, 2) / 2.0, yy + xx / 2.0
-        theta = np.swapaxes(self.elements.combination[element], 1, 2) @ self.elements.divergence[element]  # by 1, x, y
+        theta = np.swapaxes(self.elements.combination[element], 1, 2) @ self.elements.divergence[element]  # on 1, x, y
         volume = np.swapaxes(theta, 1, 2) @ sums[:, 18:, 18:] @ theta
         shear, lame = (
             modulus[element, None, None] for modulus in (self.elements.elements.shear, self.elements.elements.lame)
@@ -332,7 +332,7 @@ def skin_lengths(mesh: Mesh) -> Array:
 def edge_load(mesh: Mesh, chain: Indices, traction: Array) -> Array:
     """Return the nodal forces (nodes, c) of a traction (2 k + 1, c) [MPa] along a chain of edges (2 k + 1,).
 
-    Raises BodyError where these are no whole edges, or there is not one traction for each node.
+    Raises BodyError unless the chain has whole edges and each node has one traction.
     """
     if len(chain) != len(traction) or (len(chain) and (len(chain) < 3 or len(chain) % 2 == 0)):
         raise BodyError(

@@ -17,7 +17,7 @@ _ASIDE = 2e-8  # distance of probes on both sides of a line between elements, re
 def endings(finger: FingerMesh, centre: Array, receptor: Receptor, arcs: Array) -> Endings:
     """Return endings of `receptor` at positions `arcs` (r,) [mm], with Gauss points in each piece of an element.
 
-    An ending extends by half its length to both sides, measured along its own middle line.
+    An ending extends by half its length to both sides, measured along its middle line.
     """
     across, along = receptor.ending
     outline = finger.outline
@@ -29,7 +29,7 @@ def endings(finger: FingerMesh, centre: Array, receptor: Receptor, arcs: Array) 
     patch, piece = np.nonzero((start < stop) & reaches[:, None])
     arc, arc_weight = _gauss(start[patch, piece], stop[patch, piece])
     depth, depth_weight = _gauss(depth_lines[:-1], depth_lines[1:])
-    curved = (arc > outline.palmar) & (arc < outline.dorsal)  # under the tip's arc lengths shrink with depth
+    curved = (arc > outline.palmar) & (arc < outline.dorsal)  # beneath the tip's arc, lengths shrink with depth
     shrinkage = np.where(curved[:, None], 1.0 - depth / outline.finger.tip_radius, 1.0)
     area = (arc_weight[:, None] * depth_weight * shrinkage).ravel()
     patch = np.repeat(patch, len(_POINTS) * len(depth))
@@ -59,7 +59,7 @@ def _gauss(start: Array, stop: Array) -> tuple[Array, Array]:
 
 
 def _probes(finger: FingerMesh, centre: Array, arc: Array, depth: Array) -> Probes:
-    """Return probes (n m,) at each of the `arc` positions (n,) in turn at every `depth` (m,) [mm]."""
+    """Return probes (n m,) at every `depth` (m,) below each of the `arc` positions (n,) in turn [mm]."""
     station = np.clip(np.searchsorted(finger.arcs, arc) - 1, 0, len(finger.arcs) - 2)
     layer = np.clip(np.searchsorted(-finger.depths, -depth) - 1, 0, len(finger.depths) - 2)
     element = station[:, None] * (finger.fat + len(finger.depths) - 1) + finger.fat + layer
@@ -72,11 +72,11 @@ def _probes(finger: FingerMesh, centre: Array, arc: Array, depth: Array) -> Prob
 
 
 def _along_side(finger: FingerMesh, arc: Array, station: Indices) -> tuple[Array, Array]:
-    """Return the local coordinates (n,) of `arc` positions, and the distance of the isoparametric arc by the radius.
+    """Return the local coordinates (n,) of `arc` positions, and the radius of the mapped arc relative to the true one.
 
     The sides of an element lie along normals of the skin. Between them the isoparametric map replaces the skin's arc by
-    a parabola a little deeper than the arc: E(s) = (1 - s^2 (1 - cos a)) e_m + s sin a e_t at unit radius, with half
-    its angle a, and e_m, e_t radial and tangential in its middle. The distance is 1 where the skin is straight.
+    a parabola a little deeper than the arc: E(s) = (1 - s^2 (1 - cos a)) e_m + s sin a e_t at unit radius. Here a is
+    half its angle, and e_m, e_t are radial and tangential at its middle. The ratio is 1 where the skin is straight.
     """
     start, stop = finger.arcs[station], finger.arcs[station + 1]
     angles, first, last = (finger.outline.angle(place) for place in (arc, start, stop))

@@ -18,15 +18,15 @@ class SkinCompression(NamedTuple):
     least_chord: float  # least ratio of deformed to undeformed length, over halves of elements' sides
     element: int  # with the least ratio
     least_stretch: float  # least stretch, at the ends of elements too: more accurate where elements are large
-    kink: float  # largest jump of the tangent between elements, by undeformed length: large at a crease.
-    # Only open, compressed skin counts: jumps where it touches, or is stretched at an edge of contact, are the mesh's.
+    kink: float  # largest jump of the tangent between elements, relative to undeformed length: large at a crease.
+    # Only open, compressed skin counts: the mesh causes jumps where it touches, or is stretched at an edge of contact.
 
     @staticmethod
     def of(nodes: Array, u: Array, away_from_held: Flags, touching: Flags) -> "SkinCompression":
-        """Return how far the sides of a elements are compressed, where `away_from_held` (a,) is true.
+        """Return the compression of the sides of a elements, where `away_from_held` (a,) is true.
 
-        `nodes` (2 a + 1, 2) are their undeformed positions and `u` (2 a + 1, 2) their displacements [mm]. Some are
-        `touching` (2 a + 1,).
+        `nodes` (2 a + 1, 2) are undeformed positions, `u` (2 a + 1, 2) displacements [mm]. `touching` (2 a + 1,) flags
+        the nodes in contact.
         """
         if not away_from_held.any():
             return SkinCompression(np.inf, 0, np.inf, 0.0)

@@ -64,7 +64,7 @@ def _stray(mesh: Mesh) -> Flags:
 
 
 def _check_driven_nodes(mesh: Mesh) -> None:
-    """Raise BodyError where a driven node belongs to no element, or is the centre of one that is not driven whole."""
+    """Raise BodyError for a driven node without an element, or at the centre of an element that is not all driven."""
     stray = np.flatnonzero(_stray(mesh) & mesh.driven.any(axis=1))
     if len(stray):
         raise BodyError(f"node {stray[0]} is held and belongs to no element of the mesh; leave it out")
@@ -198,9 +198,9 @@ def check_driven(mesh: Mesh) -> None:
 
 
 def check_held(mesh: Mesh, free: Sequence[str] = ()) -> None:
-    """Raise BodyError where what is held leaves a body a motion that is not `free` for the surface to balance.
+    """Raise BodyError where the supports leave a body a rigid motion that is not `free` for the surface to balance.
 
-    Or where skin that may touch is held along y, and so cannot give way to the surface.
+    Skin that may touch must not be held along y either, because it could not yield to the surface.
     """
     unknown = [name for name in free if name not in MOTIONS]
     if unknown:

@@ -1,14 +1,14 @@
-"""Arc-length continuation of a branch of settled slides to its limit point or to the folding of the skin.
+"""Arc-length continuation of a branch of full slip to its limit point or to the folding of the skin.
 
 Under a deep press and a drag towards the tip, the skin behind the contact folds. Then the friction coefficient or the
-depth passes a maximum along the branch, or the surface of the skin loses stability at one place. Beyond, there is no
-settled state. The constraint is the plane of Riks (1979, Int. J. Solids Struct. 15, 529; Crisfield 1981, Comput.
-Struct. 13, 55).
+depth passes a maximum along the branch, or the surface of the skin loses stability at one place. Beyond, full slip does
+not exist. The constraint is the plane of Riks (1979, Int. J. Solids Struct. 15, 529; Crisfield 1981, Comput. Struct.
+13, 55).
 
-A compressed half-space loses stability at all wavelengths at once (Biot 1963, Appl. Sci. Res. A 12, 168). There the
-surface impedance, which maps displacements exp(i k X) to tractions, is singular. The equations of a free surface are
-ill-posed at that stretch, and finer meshes come ever nearer to it. The theory is that of small motions on a large
-strain (Dowaikh and Ogden 1990, IMA J. Appl. Math. 44, 261), here for any law in plane strain.
+A compressed half-space loses stability at all wavelengths simultaneously (Biot 1963, Appl. Sci. Res. A 12, 168). The
+surface impedance, which maps displacements exp(i k X) to tractions, is singular at that stretch. The equations of a
+free surface are ill-posed there, and finer meshes come ever nearer to it. The theory is that of small motions
+superposed on a large strain (Dowaikh and Ogden 1990, IMA J. Appl. Math. 44, 261), here for any law in plane strain.
 """
 
 from contextlib import suppress
@@ -35,12 +35,12 @@ LARGEST_MU = 2.0  # largest coefficient of friction to which a branch is followe
 class BranchControl:
     """Control of the continuation and of its end; steps are fractions of the largest range.
 
-    A hundredth of the tolerance changed no limit of eleven slides by more than 0.013 %, steps a quarter as long by
-    0.17 %, half of the unit or double by 0.7 %.
+    On eleven slides, limits change by at most 0.013 % with a hundredth of the tolerance, by 0.17 % with steps a quarter
+    as long, and by 0.7 % with half or double the displacement scale.
     """
 
     tolerance: float = 1e-5  # of a point on the branch, relative to the length scale of the body
-    first_step: float = 0.1  # along the branch
+    first_step: float = 0.1  # arc length along the branch
     min_step: float = 1e-3
     step_growth: float = 1.5  # ratio of the next step to one with few iterations
     few_iterations: int = 5  # iterations that count as few
@@ -49,13 +49,13 @@ class BranchControl:
     min_cosine: float = 0.7  # between the directions of the branch and of a step along it
     min_stretch_ratio: float = 0.85  # of consecutive points: a jump to a fold has less
     max_kink: float = 0.6  # kink from which skin has a crease: smooth skin on coarse meshes has 0.3, creases 1 and more
-    regular_rate: float = 0.1  # share of the parameter in the tangent from which a limit point is far
+    regular_rate: float = 0.1  # share of the parameter in the tangent above which a limit point is far
     max_restarts: int = 3  # attempts to continue beyond the end of a branch
-    restart_steps: tuple[float, ...] = (0.01, 0.03)  # relative steps of the parameter for that
-    max_force_change: float = 0.05  # relative, in such a step
+    restart_steps: tuple[float, ...] = (0.01, 0.03)  # relative steps of the parameter in these attempts
+    max_force_change: float = 0.05  # relative, in a restart step
     max_stretch_change: float = 0.04  # of the least stretch, between consecutive points
-    stretch_change_share: float = 0.5  # part of that change at which a step aims
-    displacement_scale: float = 0.1  # relative to the length scale of the body: counts as much as a friction of 1
+    stretch_change_share: float = 0.5  # part of `max_stretch_change` that a step aims at
+    displacement_scale: float = 0.1  # relative to the body's length scale: weighs as much as a friction of 1
 
 
 BRANCH = BranchControl()
@@ -70,7 +70,7 @@ class BranchBody(Protocol):
         """Newton's method on the body."""
 
     def skin_compression(self, state: EquilibriumState) -> SkinCompression:
-        """Return how far the skin is squeezed, and whether it has a crease."""
+        """Return the compression of the skin, and its creases."""
 
     def crosses(self, state: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
@@ -78,12 +78,12 @@ class BranchBody(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Branch:
-    """A branch of settled slides; its last state is at the target, a step beyond it, or the last before the limit."""
+    """A branch of full slip; its last state is at the target, a step beyond it, or the last before the limit."""
 
     states: tuple[EquilibriumState, ...]
     value: float  # largest friction coefficient or depth [mm] on it
     ends_early: bool  # whether the branch ends before its target
-    corrector_failed: bool = False  # whether only the corrector failed there, far from a limit point and from a fold
+    corrector_failed: bool = False  # whether only the corrector failed, far from a limit point and from a fold
     length: float | None = None  # of the next step along it, where it continues
 
     @property
@@ -101,13 +101,13 @@ class _Point(NamedTuple):
 class _Tangent(NamedTuple):
     """A unit tangent of a branch."""
 
-    direction: Array  # (2 k,) unknowns of the skin, by `Continuation.unit`
+    direction: Array  # (2 k,) unknowns of the skin, relative to `Continuation.unit`
     rate: float  # of the parameter
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Continuation:
-    """The continuation of settled slides of a body in friction or depth, up to where its skin folds."""
+    """The continuation of a body's full slip in friction or depth, up to the fold of its skin."""
 
     body: BranchBody
     parameter: int  # BY_FRICTION or BY_DEPTH
@@ -118,7 +118,7 @@ class Continuation:
         return self.stop_at(self.trace(start, target), target)
 
     def trace(self, start: EquilibriumState, target: float, length: float | None = None) -> Branch:
-        """Follow a branch as `follow` does, and continue where it turns back only over a short stretch."""
+        """Follow a branch as `follow` does, and continue where it turns back only over a short range."""
         branch = self.follow(start, target, length)
         for _ in range(BRANCH.max_restarts):
             beyond = self._restart(branch, target) if branch.ends_early else None
@@ -129,9 +129,9 @@ class Continuation:
         return branch
 
     def _restart(self, branch: Branch, target: float) -> EquilibriumState | None:
-        """Return a state a little beyond the end of a branch; None where it really ends.
+        """Return a state a little beyond the end of a branch; None where the branch ends for good.
 
-        Where a node of the contact reaches the shear limit, a discrete branch may turn back over a short stretch.
+        Where a node in contact reaches the shear limit, a discrete branch may turn back over a short range.
         """
         last = branch.last
         least = self.body.skin_compression(last).least_chord
@@ -149,7 +149,7 @@ class Continuation:
         return None
 
     def _continues(self, least: float, last: EquilibriumState, state: EquilibriumState) -> bool:
-        """Return whether a state follows the `last` one, with skin stretched to `least`, without a jump."""
+        """Return whether a state follows the `last` one, with the least stretch `least`, without a jump."""
         return self.body.skin_compression(state).least_chord >= least - BRANCH.max_stretch_change and not jumped_branch(
             self.body, last, state
         )
@@ -221,7 +221,7 @@ class Continuation:
 
     @property
     def unit(self) -> float:
-        """Displacement of one unknown that counts as much as a unit of the parameter, a friction or a mm [mm]."""
+        """Displacement of one unknown that weighs as much as a unit of the parameter: a friction of 1, or 1 mm [mm]."""
         newton = self.body.newton
         norm = BRANCH.displacement_scale * newton.length_scale if self.parameter == BY_FRICTION else 1.0
         return norm * float(np.sqrt(len(newton.steps)))
@@ -293,12 +293,12 @@ def jumped_branch(body: BranchBody, before: EquilibriumState, after: Equilibrium
 Waves = NDArray[np.complex128]
 _STEP = 0.01  # step of the stretch in the search for the loss of stability
 _LEAST = 0.05  # smallest stretch of that search
-HALVINGS = 40  # of its last step
+HALVINGS = 40  # of the last step of that search
 
 
 @lru_cache(maxsize=16)
 def critical_stretch(law: Law) -> float:
-    """Return the stretch along a free surface at which it loses stability in plane strain; _LEAST where it never does.
+    """Return the stretch at which a free surface loses stability in plane strain; _LEAST where it never does.
 
     Biot's root for neo-Hookean tissue that keeps its volume, 0.5437:
 
@@ -333,7 +333,7 @@ def _stable(law: Law, stretch: float) -> bool:
 
 
 def _impedance(along: Array, mixed: Array, across: Array) -> Waves | None:
-    """Return the impedance (2, 2) of waves exp(i (X + p Y)) that decay with depth; None where two do not.
+    """Return the impedance (2, 2) of waves exp(i (X + p Y)) that decay with depth; None unless there are two.
 
     `along`, `mixed`, `across` (2, 2) are the moduli dP_aA/dF_bB with A, B = X, X; X, Y; Y, Y.
     """

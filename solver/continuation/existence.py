@@ -1,4 +1,4 @@
-"""Existence of the settled slide at finite strain: a proof for a state, or a refusal with its limits."""
+"""Existence of full slip at finite strain: a proof for a state, or a refusal with its limits."""
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -28,11 +28,11 @@ def slide_on_branch(
     tolerance: float = TO_ROUND_OFF.tolerance,
     start: EquilibriumState | None = None,
 ) -> EquilibriumState:
-    """Return the settled slide under `load` that lies on the branch from the frictionless state or a shallow press.
+    """Return full slip under `load` on the branch from the frictionless state or from a shallow press.
 
     The search begins at `start`. A state whose skin might have folded, or that is not found directly, is proven by
-    following the branch on meshes made for it. Raises NoSteadyState with its limits where the branch ends before,
-    NotConverged where it has no first state, Cancelled.
+    following the branch on meshes made for it. Raises NoSteadyState with the limits where the branch ends before
+    `load`, NotConverged where it has no first state, Cancelled.
     """
     candidates: list[EquilibriumState] = []
     for state in _direct_states(finger.newton, load, tolerance, start):
@@ -65,7 +65,7 @@ def slide_on_branch(
 
 
 def is_on_branch(finger: FiniteFinger, state: EquilibriumState) -> bool:
-    """Return whether a state lies on the branch from the frictionless state, where need be by following that."""
+    """Return whether a state lies on the branch from the frictionless state, by following this branch if necessary."""
     if is_sound(finger, state, LIMIT.safe_stretch):
         return True
     if not is_sound(finger, state):
@@ -82,8 +82,8 @@ def is_mostly_shear_limited(load: LoadState) -> bool:
 def refuse_far_beyond(scene: Scene, load: LoadState) -> None:
     """Raise NoSteadyState where the branch ends far below the friction or depth of `load`.
 
-    For a coarse mesh without a state, or with folded skin: a failing fine mesh costs more than following the branch.
-    Nothing is raised where the branch ends so near that another mesh may have the state.
+    It serves a coarse mesh without a state, or with folded skin: a fine mesh that fails costs more than following the
+    branch. It raises nothing where the branch ends so near that another mesh may have the state.
     """
     with suppress(NotConverged):
         proof = _limit_towards(scene, load)
@@ -111,7 +111,7 @@ def _direct_states(
 
 
 def limit_warnings(finger: FiniteFinger, state: EquilibriumState) -> tuple[str, ...]:
-    """Return a warning for a settled slide near the limit of friction, else nothing."""
+    """Return a warning for full slip near a limit of friction or depth, else nothing."""
     if state.load.sense == 0 or is_sound(finger, state, LIMIT.safe_stretch):
         return ()
     proof = _limit_towards(finger.scene, state.load)
@@ -126,10 +126,10 @@ def limit_warnings(finger: FiniteFinger, state: EquilibriumState) -> tuple[str, 
 
 
 def _limit_towards(scene: Scene, load: LoadState) -> ContinuationLimit:
-    """Return the range of the branch by friction, or by depth where only that reaches `load`.
+    """Return the range of the branch in friction, or in depth where only this branch reaches `load`.
 
-    Where nearly all skin is shear-limited, states hardly depend on mu, so that its limit is ill-conditioned. Deep in
-    the tissue skin folds without friction, and slides with some: there the branch by friction has no first state.
+    Where nearly all skin is shear-limited, states hardly depend on mu, so that its limit is ill-conditioned. Under very
+    deep presses skin folds without friction, and slides with some: the branch in friction then has no first state.
     """
     if load.frictionless:
         return depth_limit(scene, load)
@@ -147,7 +147,7 @@ def _limit_towards(scene: Scene, load: LoadState) -> ContinuationLimit:
 def _no_slide(scene: Scene, load: LoadState, proof: ContinuationLimit) -> NoSteadyState | NotConverged:
     """Return the failure with both limits, each only where no state lies a little beyond it.
 
-    A branch in depth alone is a limit where the skin folds.
+    The end of a branch in depth counts as a limit only where the skin folds.
     """
     if proof.by_depth:
         if not proof.is_near_fold:
@@ -197,8 +197,8 @@ def _undecided(load: LoadState, proof: ContinuationLimit) -> NotConverged:
 def _has_no_slide(scene: Scene, further: LoadState, load: LoadState) -> bool:
     """Return whether `further`, a little beyond a limit, has no state along the other parameter's branch.
 
-    A limit of depth is checked by friction, a limit of friction by depth. Nothing is checked beyond `load`, which has
-    no state.
+    A limit of depth is checked along the branch in friction, and vice versa. Loads beyond `load`, which has no state,
+    are not checked.
     """
     if further.depth >= load.depth and further.mu >= load.mu:
         return True
@@ -217,9 +217,9 @@ def _agrees(finger: FiniteFinger, state: EquilibriumState, proof: ContinuationLi
 
 
 def slide_from_limited_skin(newton: Newton, load: LoadState, tolerance: float) -> EquilibriumState:
-    """Return the settled slide from the frictionless one, with all its contact shear-limited and a growing bound.
+    """Return full slip from the frictionless state, with all its contact shear-limited under a growing bound.
 
-    Under a low bound and a large mu, skin is shear-limited at small pressures, so that slip is a bad first guess.
+    Under a low bound and a large mu, skin is shear-limited even at small pressures, so that slip is a bad first guess.
     Raises NotConverged.
     """
     frictionless = solve_full_slip(newton, load._replace(mu=0.0), None, tolerance)

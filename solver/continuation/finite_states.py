@@ -32,21 +32,21 @@ from solver.scene import Scene
 
 @dataclass(frozen=True, slots=True)
 class ForceSearch:
-    """Control of the search for a nearby state, and for the depth at which the normal force is the given one."""
+    """Control of the search for a nearby state, and for the depth under a given normal force."""
 
     intermediate_tolerance: float = 1e-4  # of displacements, relative to the length scale of the body
-    depth_factor: float = 1.5  # ratio of the largest depth searched to the one from which the force did not grow
+    depth_factor: float = 1.5  # ratio of the largest depth searched to the depth at which force control failed
     force_tolerance: float = 1e-9  # of the normal force, relative
-    max_searches: int = 20  # steps for the depth
+    max_searches: int = 20  # Newton steps for the depth
     max_depth_change: float = 0.25  # relative, in a step
     min_det: float = 0.3  # det F below which the mesh, and not the body, ends a branch
 
 
 FORCE_SEARCH = ForceSearch()
-# Iterations on a nested mesh start from the solution on the coarser one, so that their first step is the difference
-# between both, which estimates the error. They end once a twentieth of it remains. In 48 scenes at finite strain,
-# 1e-10 mm in its place took half as long again, and changed estimates by 2e-5 in the median and 7 % at most. Half of
-# the part or double of it changed no more.
+# Iterations on a nested mesh start from the solution on the coarser mesh, so that their first step is the difference
+# of both meshes, which estimates the error. They end once a twentieth of it remains. In 48 scenes at finite strain, a
+# tolerance of 1e-10 mm takes half as long again, and changes estimates by 2e-5 in the median and 7 % at most. Half or
+# double the part changes no more.
 ON_NESTED_MESH = Termination(relative_to_first=0.05, max_iterations=10)
 
 
@@ -55,7 +55,7 @@ def settled_state(
 ) -> EquilibriumState:
     """Return the settled state of a scene; the search begins at `start`, a proven state nearby.
 
-    A state that depends on its load path takes `step_factor` times the usual load steps, and its load has no sense.
+    A state that depends on its load path takes `step_factor` times the usual load steps, and its load has sense 0.
     Raises NoSteadyState, NotConverged, Cancelled.
     """
     if scene.loading.direction == 0 and scene.friction.mu > 0.0:
@@ -66,7 +66,7 @@ def settled_state(
 
 
 def slide_near(finger: FiniteFinger, scene: Scene, start: EquilibriumState) -> EquilibriumState | None:
-    """Return the settled slide within a few iterations from `start`; None where there is none, or it is unproven."""
+    """Return full slip after a few iterations from `start`; None where they fail or the state is unproven."""
     newton, force = finger.newton, scene.normal_force
     try:
         if force is None:
@@ -81,9 +81,9 @@ def slide_near(finger: FiniteFinger, scene: Scene, start: EquilibriumState) -> E
 
 
 def rough_state(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None = None) -> EquilibriumState:
-    """Return an approximate settled state, a start for others where `is_sound` says so. Raises as `settled_state`.
+    """Return an approximate settled state, from which others may start if it `is_sound`. Raises as `settled_state`.
 
-    The search begins at `near`, the settled state of another surface, where that slides in the same direction.
+    The search begins at `near`, the settled state of another surface, if that slides in the same direction.
     """
     if near is not None:
         same_direction = near.load.sense == -(scene.loading.direction or 1)
@@ -116,7 +116,7 @@ def _state_under_force(
 
 
 def _under_force(scene: Scene, force: float, failure: NoSteadyState) -> NoSteadyState:
-    """Return the failure of a scene under a normal force, from the `failure` at its depths, without a limit of mu."""
+    """Return the failure of a scene under a normal force, from the `failure` at a depth, without a limit of mu."""
     depth, most = failure.limit_indentation, failure.limit_normal_force
     far = [] if most is None else [f"{most:.3g} N/mm"]
     far += [] if depth is None else [f"{depth:.3g} mm of indentation"]
@@ -132,7 +132,7 @@ def _under_force(scene: Scene, force: float, failure: NoSteadyState) -> NoSteady
 def _sliding_under(
     finger: FiniteFinger, scene: Scene, force: float, start: EquilibriumState | None
 ) -> EquilibriumState:
-    """Return the settled slide under the normal force of a scene, from `start` or as the force grows."""
+    """Return full slip under the normal force of a scene, from `start` or by a growing force."""
     newton = finger.newton
     load = sliding_load(scene)
     at_bound = is_mostly_shear_limited(load)
@@ -154,7 +154,7 @@ def _sliding_under(
     states: list[EquilibriumState] = []
     try:
         for state in _increase_force(newton, load, force):
-            states.append(state)  # those before a failure count
+            states.append(state)  # states before a failure count
     except NotConverged as failure:
         if states:
             return _slide_deeper(finger, states[-1], force)
@@ -165,7 +165,7 @@ def _sliding_under(
     *before, last = states
     try:
         return slide_on_branch(finger, last.load, start=last)
-    except NoSteadyState:  # it lies beyond a limit, which has a force as well as a depth
+    except NoSteadyState:  # beyond a limit, which has a force as well as a depth
         return _slide_deeper(finger, before[-1], force)
 
 
@@ -177,7 +177,7 @@ def _increase_force(newton: Newton, load: LoadState, force: float) -> Iterator[E
 
 
 def _at_force(newton: Newton, start: EquilibriumState, force: float) -> EquilibriumState:
-    """Return the slide with a normal `force` [N/mm], by Newton's method for its depth. Raises NotConverged."""
+    """Return full slip under a normal `force` [N/mm], by Newton's method for its depth. Raises NotConverged."""
     state, depth = start, start.load.depth
     for _ in range(FORCE_SEARCH.max_searches):
         state = load_stepping.solve_full_slip(newton, state.load._replace(depth=depth), state)
@@ -194,10 +194,10 @@ def _at_force(newton: Newton, start: EquilibriumState, force: float) -> Equilibr
 
 
 def _slide_deeper(finger: FiniteFinger, state: EquilibriumState, force: float) -> EquilibriumState:
-    """Return the settled slide under `force` [N/mm] deeper than `state`, beyond which force control failed.
+    """Return full slip under `force` [N/mm] deeper than `state`, beyond which force control failed.
 
     `limit_point` finds the largest depth and its force. Where a slightly deeper state exists nevertheless, the search
-    continues there. Raises as `settled_state`.
+    continues from this state. Raises as `settled_state`.
     """
     proof = depth_limit(finger.scene, state.load._replace(depth=FORCE_SEARCH.depth_factor * state.load.depth))
     if proof.is_certain and proof.numbers[1] < force:
@@ -211,8 +211,8 @@ def _slide_reaching_force(
 ) -> EquilibriumState:
     """Return a slide beyond the limit depth of `proof` with a normal force of `force` [N/mm] or more.
 
-    Depths grow by the difference of limits between two meshes. Raises NoSteadyState between a depth with a state and
-    one without, NotConverged where existence is not known.
+    Depths grow by the difference of limits between two meshes. Raises NoSteadyState at the first depth without a state,
+    NotConverged where existence is unknown.
     """
     depth, most = proof.value, float(proof.numbers[1])
     while most < force:
@@ -226,7 +226,7 @@ def _slide_reaching_force(
 
 
 def _beyond(depth: float, force: float) -> NoSteadyState:
-    """Return the failure of a force beyond that of the deepest slide, at a `depth` [mm] with a `force` [N/mm]."""
+    """Return the failure of a force beyond the deepest slide, which has a `depth` [mm] and a `force` [N/mm]."""
     return NoSteadyState("There is none so deep.", limit_indentation=depth, limit_normal_force=force)
 
 
@@ -241,9 +241,9 @@ def solve_dead_load(
     """Return the equilibrium under dead `loads` (nodes, 2) [N/mm], with held nodes displaced by `prescribed` [mm].
 
     `prescribed` (nodes, 2) is 0 at free nodes. The path begins at `start` or the undeformed state, and has `steps`
-    equal steps; one that fails is halved. `load` is constant, by default without depth and friction. The loads stay on
-    the body. Raises BodyError for arrays of another shape, ValueError for a load on the centre of an element and for a
-    load state that is not allowed, NotConverged where no equilibrium is found.
+    equal steps; a step that fails is halved. `load` is constant, by default without depth and friction. The loads stay
+    on the body. Raises BodyError for arrays of another shape, ValueError for a load on the centre of an element and for
+    a load state that is not allowed, NotConverged where no equilibrium is found.
     """
     newton, condensed = Newton(body.condensed), body.condensed
     check_loads(body.mesh, loads, prescribed)
@@ -284,11 +284,11 @@ def _on_unknowns(body: FiniteBody, loads: Array) -> Array:
 def steady_body(
     body: FiniteBody, load: LoadState, skin: Law, start: EquilibriumState | None = None
 ) -> EquilibriumState:
-    """Return the settled slide of a body under `load`, followed on its mesh from the frictionless state.
+    """Return full slip of a body under `load`, followed on its mesh from the frictionless state.
 
-    The search for that begins at `start` or the undeformed state. `skin` is the law of the tissue that may fold. Raises
-    NoSteadyState with the largest friction on this mesh where the branch ends before, at a limit point or where the
-    skin folds; NotConverged where it is lost before, or has no first state.
+    The search for the frictionless state begins at `start` or the undeformed state. `skin` is the law of the tissue
+    that may fold. Raises NoSteadyState with the largest friction on this mesh where the branch ends before `load`, at a
+    limit point or a fold of the skin; NotConverged where the branch is lost, or has no first state.
     """
     newton = Newton(body.condensed)
     branch_body = _OwnBody(body, newton)
@@ -308,13 +308,13 @@ def steady_body(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _OwnBody:
-    """A body whose skin is checked for folds wherever it may touch."""
+    """A body whose skin is checked for folds in all parts that may touch."""
 
     body: FiniteBody
     newton: Newton
 
     def skin_compression(self, state: EquilibriumState) -> SkinCompression:
-        """Return how far the skin is squeezed, and whether it has a crease."""
+        """Return the compression of the skin, and its creases."""
         skin = self.body.mesh.skin
         every = np.ones(len(skin) // 2, bool)
         return SkinCompression.of(self.body.mesh.nodes[skin], state.u[skin], every, state.touching)
@@ -324,5 +324,5 @@ class _OwnBody:
         return crosses_itself(self.newton.condensed.skin_positions(state.u))
 
     def is_unusable(self, state: EquilibriumState) -> bool:
-        """Return whether contact has come to an end of the skin, or an element is crushed."""
+        """Return whether contact has reached an end of the skin, or an element is crushed."""
         return state.reaches_end or self.body.smallest_det(state.u) < FORCE_SEARCH.min_det

@@ -1,7 +1,7 @@
-"""Limits of friction and depth of settled slides at finite strain.
+"""Limits of friction and depth of full slip at finite strain.
 
-They are found on meshes made for them. The branch is followed on a coarse mesh to near its end, which shows where the
-skin is compressed most. Skin folds within some tenths of a millimetre, so the branch is continued on a mesh with small
+They are computed on meshes made for them. The branch is followed on a coarse mesh almost to its end, which shows where
+the skin is compressed most. A fold spans some tenths of a millimetre, so the branch is continued on a mesh with small
 elements there. `daq-app accuracy` measures the accuracy of these limits.
 """
 
@@ -20,19 +20,19 @@ from solver.mesh.mesher import EPIDERMIS, Sizing
 from solver.scene import Scene
 from solver.scene.tables import SHALLOW
 
-FINENESS = 7.0  # elements to a tip radius of both meshes, except at a fold
-_MARGIN = 6.0  # relative to the indentation: height of the undeformed skin up to which contact is considered
+FINENESS = 7.0  # elements per tip radius of both meshes, except at a fold
+_MARGIN = 6.0  # height of the undeformed skin up to which contact is considered, relative to the indentation
 
 
 @dataclass(frozen=True, slots=True)
 class LimitControl:
-    """Which states may begin or end a branch; least stretches of the skin, and fractions."""
+    """Which states may begin or end a branch: least stretches of the skin, and fractions."""
 
     resolved_stretch: float = 0.66  # above it, states of the coarse mesh agree with those of the fine one
-    sound_stretch: float = 0.65  # from which others may start: neo-Hookean surfaces fold at 0.54
-    safe_stretch: float = 0.71  # above it, a state needs no proof: meshes just below a limit have up to 0.70
-    max_fold_shift: float = 0.1  # from its expected place, relative to the tip radius: beyond, another mesh is made
-    start_fractions: tuple[float, ...] = (0.3, 0.1, 0.03, 0.01)  # of the depth at which its branch may begin
+    sound_stretch: float = 0.65  # from it, other states may start here: neo-Hookean surfaces fold at 0.54
+    safe_stretch: float = 0.71  # above it, a state needs no proof: states just below a limit have up to 0.70
+    max_fold_shift: float = 0.1  # from its expected place, relative to the tip radius: beyond it, another mesh is made
+    start_fractions: tuple[float, ...] = (0.3, 0.1, 0.03, 0.01)  # of the target depth, at which a branch may begin
     near_fold: float = 0.02  # above the critical stretch: some 2 % of the friction
 
 
@@ -52,12 +52,12 @@ def is_folded(finger: FiniteFinger, state: EquilibriumState) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class BranchSearch:
-    """A branch of settled slides to be followed on meshes made for it."""
+    """A branch of full slip to be followed on meshes made for it."""
 
     scene: Scene  # unloaded
-    load: LoadState  # at the beginning of the branch by friction, at the end of one by depth
-    parameter: int  # the parameter: BY_FRICTION or BY_DEPTH
-    target: float  # its last value
+    load: LoadState  # at the beginning of a branch in friction, at the end of a branch in depth
+    parameter: int  # BY_FRICTION or BY_DEPTH
+    target: float  # last value of the parameter
 
     @property
     def critical_stretch(self) -> float:
@@ -70,7 +70,7 @@ class BranchSearch:
 
     @property
     def last(self) -> float:
-        """The largest value to which the branch is followed; beyond LARGEST_MU the bound governs."""
+        """The largest value to which the branch is followed; beyond LARGEST_MU the traction bound governs."""
         return self.target if self.parameter == BY_DEPTH else min(self.target, LARGEST_MU)
 
     def to(self, target: float) -> "BranchSearch":
@@ -78,7 +78,7 @@ class BranchSearch:
         return replace(self, target=target)
 
     def trace(self, finger: FiniteFinger, start: EquilibriumState, length: float | None = None) -> Branch:
-        """Return the branch from `start` until it passes the target; its first step has the `length`."""
+        """Return the branch from `start` until it passes the target; `length` is that of its first step."""
         return self._on(finger).trace(start, self.last, length)
 
     def _on(self, finger: FiniteFinger) -> Continuation:
@@ -96,7 +96,7 @@ class BranchSearch:
     def trace_on_fine_mesh(
         self, finger: FiniteFinger, states: tuple[EquilibriumState, ...]
     ) -> tuple[FiniteFinger, Branch, float]:
-        """Return a finger that is fine where the last of `states` is compressed most, its branch, and that place."""
+        """Return a finger with a fine mesh where the last of `states` is most compressed, its branch and that place."""
         place = _place_of_least_stretch(finger, states[-1])
         fine = self.finger(place)
         branch = self.trace(fine, self._start_on_fine_mesh(fine, finger, states))
@@ -120,7 +120,7 @@ class BranchSearch:
     def _start_on_fine_mesh(
         self, fine: FiniteFinger, rough: FiniteFinger, states: tuple[EquilibriumState, ...]
     ) -> EquilibriumState:
-        """Return the state on the `fine` mesh of the last of `states` that the `rough` mesh resolves."""
+        """Return, on the `fine` mesh, the last of the `states` that the `rough` mesh resolves."""
         for state in reversed(states):
             if rough.skin_compression(state).least_stretch < LIMIT.resolved_stretch:
                 continue
@@ -133,14 +133,14 @@ class BranchSearch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContinuationLimit:
-    """The range of a branch of settled slides, from zero friction or from a small depth."""
+    """The range of a branch of full slip, from zero friction or from a small depth."""
 
     search: BranchSearch
-    value: float  # friction coefficient or depth [mm] at its end: the target, or the largest
-    ends_early: bool  # whether the branch ends there
-    corrector_failed: bool  # whether only the corrector failed there, so that the branch may continue
-    least_stretch: float  # least stretch of the skin at its last state [-]
-    numbers: Array  # (3,) SED of the ending, normal and tangential force at its last state
+    value: float  # friction coefficient or depth [mm] at its end: the target, or the largest value
+    ends_early: bool  # whether the branch ends before its target
+    corrector_failed: bool  # whether only the corrector failed, so that the branch may continue
+    least_stretch: float  # least stretch of the skin at the last state [-]
+    numbers: Array  # (3,) SED of the ending, normal and tangential force at the last state
 
     @property
     def is_certain(self) -> bool:
@@ -154,14 +154,14 @@ class ContinuationLimit:
 
     @property
     def by_depth(self) -> bool:
-        """Whether it is followed in depth."""
+        """Whether the branch is followed in depth."""
         return self.search.parameter == BY_DEPTH
 
 
 def friction_limit(scene: Scene, load: LoadState, target: float) -> ContinuationLimit:
-    """Return the range of slides at the depth and bound of `load`, from mu = 0 to `target`.
+    """Return the range of full slip at the depth and bound of `load`, from mu = 0 to `target`.
 
-    Raises NotConverged where not even the frictionless state is found, Cancelled.
+    Raises NotConverged where no frictionless state is found, Cancelled.
     """
     return _continuation_limit(
         BranchSearch(scene.frictionless_press(SHALLOW), load._replace(mu=0.0, travel=0.0), BY_FRICTION, target)
@@ -169,9 +169,9 @@ def friction_limit(scene: Scene, load: LoadState, target: float) -> Continuation
 
 
 def depth_limit(scene: Scene, load: LoadState) -> ContinuationLimit:
-    """Return the range of slides at the friction of `load`, from a small depth to that of `load`.
+    """Return the range of full slip at the friction of `load`, from a small depth to that of `load`.
 
-    Raises NotConverged where no slide is found even at a hundredth of that depth, Cancelled.
+    Raises NotConverged where no state is found even at a hundredth of that depth, Cancelled.
     """
     return _continuation_limit(
         BranchSearch(scene.frictionless_press(SHALLOW), load._replace(travel=0.0), BY_DEPTH, load.depth)
@@ -199,7 +199,7 @@ def _coarse_branch(search: BranchSearch) -> Branch:
 
 @lru_cache(maxsize=32)
 def _continuation_limit(search: BranchSearch) -> ContinuationLimit:
-    """Return the range of a branch, cached because all meshes of a scene need the same."""
+    """Return the range of a branch, cached because all meshes of a scene need it."""
     by_depth = search.parameter == BY_DEPTH
     coarse = _coarse_branch(search if by_depth else search.to(min(end for end in PIECES if end >= search.last)))
     if coarse.value < search.last < LARGEST_MU and not by_depth:

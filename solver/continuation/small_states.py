@@ -1,8 +1,8 @@
 """Settled states at small strain on one mesh, limits of their existence, and the depth under a normal force.
 
-The drag of a slide presses the finger down. The larger the coefficient of friction, the larger that force, until the
-forces of the settled state grow without bound at a finite coefficient. Beyond it there is no settled state: the drag
-wedges the finger into the surface. The limit is found by following the state from mu = 0.
+The drag of a slide presses the finger down, the more so the larger the coefficient of friction. At a finite coefficient
+the forces of full slip grow without bound. Beyond it full slip does not exist: the drag wedges the finger into the
+surface. The limit is found by following full slip from mu = 0.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,7 +27,7 @@ from solver.scene.tables import SHALLOW, Friction, SceneError
 WIDE_MARGIN = 16.0  # margin with which nearly all the palmar skin may touch
 _FINENESS = 7.0  # of the meshes for limits of depth and force, which hardly depend on the mesh
 COARSE_FINENESS = 6.0  # of the mesh for depths under a force, accurate to some tenths of a per cent
-COVERED_SHARE = 0.9  # depth a mesh is made for, by the highest skin in contact: it covers 1.25 times its depth
+COVERED_SHARE = 0.9  # design depth of a mesh relative to the highest skin in contact: it covers 1.25 times this depth
 NEAR_SLIDING = 0.5  # ratio of drag to friction limit from which a dragged finger is about as deep as a sliding one
 MAX_DEPTH_SHARE = 0.85  # of the tissue between first contact and bone: beyond, small strain is meaningless
 
@@ -39,9 +39,9 @@ class LimitSearch:
     fineness_ratio: float = 1.6  # of the mesh that confirms a limit of depth
     depth_factor: float = 2.0  # ratio of the largest depth searched to the largest that occurred under growing forces
     max_systems: int = 15  # for the contact states of a step
-    min_fraction: float = 1e-3  # of a depth or force that is tried
-    mu_tolerance: float = 0.005  # relative, at which the search for its limit ends
-    force_increment: float = 1e-4  # relative, which shows whether the finger gives way
+    min_fraction: float = 1e-3  # of the given depth or force, from which the search begins
+    mu_tolerance: float = 0.005  # relative, at which the search for the limit of mu ends
+    force_increment: float = 1e-4  # relative, for the sign of the change of depth with force
 
 
 LIMIT_SEARCH = LimitSearch()
@@ -50,9 +50,9 @@ LIMIT_SEARCH = LimitSearch()
 def continue_in_friction(
     newton: Newton, load: LoadState, force: float | None = None, first: EquilibriumState | None = None
 ) -> tuple[EquilibriumState | None, float]:
-    """Return the settled slide under `load`, followed from mu = 0, and the largest mu that has a slide.
+    """Return full slip under `load`, followed from mu = 0, and the largest mu that has a state.
 
-    The state is None where that is less than the mu of `load`. Under a normal `force`, `first` is the state at mu = 0,
+    The state is None where this mu is less than that of `load`. Under a normal `force`, `first` is the state at mu = 0,
     and the mu returned is 0 (unknown) where contact grew beyond the skin that may touch.
     """
     mu, step, unknown = 0.0, load.mu, False
@@ -100,7 +100,7 @@ class FingerCache:
 
 
 def limits(scene: Scene, load: LoadState) -> tuple[float | None, float | None]:
-    """Return the largest normal force [N/mm] and depth [mm] with settled sliding under `load`, to 3 and 4 %.
+    """Return the largest normal force [N/mm] and depth [mm] with full slip under `load`, to 3 and 4 %.
 
     Both are less than the scene's. The force is None where the scene prescribes a depth; unknown limits are None.
     """
@@ -114,9 +114,9 @@ def limits(scene: Scene, load: LoadState) -> tuple[float | None, float | None]:
 
 
 def _deepest(bodies: FingerCache, load: LoadState, high: float, low: float | None = None) -> float | None:
-    """Return the largest indentation [mm] between `low` and `high` with settled sliding.
+    """Return the largest indentation [mm] between `low` and `high` with full slip.
 
-    None where there is none, or where a finer mesh disagrees, as it does at coefficients far beyond the limit.
+    None where none has full slip, or where a finer mesh disagrees, as it does at coefficients far beyond the limit.
     """
 
     def slides(depth: float) -> bool:
@@ -134,9 +134,9 @@ def _deepest(bodies: FingerCache, load: LoadState, high: float, low: float | Non
 
 
 def _strongest(bodies: FingerCache, scene: Scene, force: float, load: LoadState) -> tuple[float | None, float] | None:
-    """Return the largest normal force [N/mm] below `force` with settled sliding, and the largest depth [mm] tried.
+    """Return the largest normal force [N/mm] below `force` with full slip, and the largest depth [mm] reached.
 
-    The force is None where a finer mesh disagrees; the result is None where there is no slide.
+    The force is None where a finer mesh disagrees; the result is None where no force has full slip.
     """
     depths, bone = [0.0], scene.finger.pulp_thickness()
     frictionless = load._replace(mu=0.0)
@@ -172,9 +172,9 @@ def _largest(exists: Callable[[float], bool], low: float, high: float) -> float:
 
 
 def settled_state(scene: Scene, finger: LinearFinger, step_factor: float = 1.0) -> EquilibriumState:
-    """Return the settled state: a slide directly, a path-dependent one in `step_factor` times the usual load steps.
+    """Return the settled state: full slip directly, a path-dependent state in `step_factor` times the usual load steps.
 
-    Raises NotConverged, ContactLost where no slide was found, and NoSteadyState where the given drag exceeds friction.
+    Raises NotConverged, ContactLost where no state was found, NoSteadyState where a drag exceeds the friction limit.
     """
     load, loading, newton = sliding_load(scene), scene.loading_per_mm, finger.newton
     if loading.direction == 0 and not load.frictionless:
@@ -207,7 +207,7 @@ def follow_friction(scene: Scene, finger: LinearFinger) -> tuple[EquilibriumStat
 
 
 def is_unstable_under_force(scene: Scene, finger: LinearFinger, state: EquilibriumState) -> bool:
-    """Return whether a settled slide under a given force would be less deep under a little more force."""
+    """Return whether full slip under a given force would be less deep under a little more force."""
     force = scene.normal_force
     if force is None or scene.loading.direction == 0 or state.sticking > 0.0:
         return False
@@ -220,7 +220,7 @@ def is_unstable_under_force(scene: Scene, finger: LinearFinger, state: Equilibri
 
 
 def refuse_beyond_tissue(scene: Scene, finger: LinearFinger, depth: float) -> None:
-    """Raise SolveFailure where a given force leads to a meaningless `depth` [mm], as beyond the bone."""
+    """Raise SolveFailure where a given force leads to a meaningless `depth` [mm], for example beyond the bone."""
     room, most = scene.finger.bone_depth(), None
     if depth >= room:
         with suppress(ContactLost):
@@ -234,7 +234,7 @@ def remove_round_off(
     """Return a state and its displacement (nodes, 2) after one step of iterative refinement.
 
     The elimination leaves residuals of some 1e-13 of the forces, which differ between processors. A step from the
-    elements' own residual removes them. Contact states change only where they must.
+    residual of the elements removes them. Contact states change only where they contradict the solution.
     """
     about, recover = finger.body.linearise_about(displacement)
     newton = Newton(about)
@@ -271,8 +271,8 @@ def nearest_state(scene: Scene, finger: LinearFinger) -> EquilibriumState:
 def state_on_branch(scene: Scene, finger: LinearFinger, step_factor: float = 1.0) -> EquilibriumState:
     """Return the settled state, a path-dependent one after `step_factor` times the usual load steps.
 
-    Near or beyond a limit, guesses can converge to states to which no slide leads. Where none was found, or a folded
-    one, only the state followed from mu = 0 counts. Raises NoSteadyState, NotConverged.
+    Near or beyond a limit, guesses can converge to states to which no slide leads. Where they fail, or lead to a folded
+    state, only the state followed from mu = 0 counts. Raises NoSteadyState, NotConverged.
     """
     direction = scene.loading.direction
     try:
@@ -292,7 +292,7 @@ def state_on_branch(scene: Scene, finger: LinearFinger, step_factor: float = 1.0
 
 
 def _no_slide(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotConverged:
-    """Return the failure of a scene without a slide, with the limits that are known."""
+    """Return the failure of a scene without full slip, with the limits that are known."""
     force = scene.normal_force
     conditions = f"{scene.loading.depth:g} mm indentation" if force is None else f"a normal force of {force:g} N/mm"
     conditions += f" and mu = {float(scene.friction.mu):g}"
@@ -303,7 +303,7 @@ def _no_slide(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotCon
             f"No settled state was found at {conditions}, from any first guess: {why}; ask for less friction or depth."
         )
     limit_force = limit_depth = None
-    with suppress(NotConverged):  # stiffnesses that a mesh for less depth does not stand
+    with suppress(NotConverged):  # stiffnesses that are lost in round-off on a mesh for less depth
         limit_force, limit_depth = limits(scene, sliding_load(scene))
     pairs = ((limit_force, "N/mm"), (limit_depth, "mm"))
     elsewhere = " and ".join(f"{limit:.3g} {unit}" for limit, unit in pairs if limit is not None)
@@ -321,10 +321,10 @@ def _no_slide(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotCon
 
 
 def matching_depths(scenes: Sequence[Scene], normal_forces: Sequence[float]) -> tuple[float | None, ...]:
-    """Return the indentation [mm] of each scene at which its settled normal force is the given one [N/mm].
+    """Return the indentation [mm] of each scene under the given normal force [N/mm] in full slip.
 
     The depth is an unknown of one solve. All scenes share the finger, materials and receptor of the first. None where
-    the finger would be pressed to its bone, or has no such settled state.
+    the finger would be pressed to its bone, or has no full slip.
     """
     if not scenes:
         return ()
@@ -335,7 +335,7 @@ def matching_depths(scenes: Sequence[Scene], normal_forces: Sequence[float]) -> 
 
 
 def expected_depth(scene: Scene) -> float:
-    """Return the indentation [mm] for which a mesh is made: the given one, or an estimate under a given force."""
+    """Return the indentation [mm] for which a mesh is made: the given depth, or an estimate under a given force."""
     force = scene.normal_force
     if force is None:
         return scene.loading.depth
@@ -348,12 +348,12 @@ def expected_depth(scene: Scene) -> float:
     drag = scene.tangential_force or 0.0
     is_static = scene.loading.direction == 0 or scene.loading.dragged
     if is_static and (state is None or drag < NEAR_SLIDING * abs(state.force[0])):
-        # Then it is about as deep as one that slides under the same drag.
+        # The finger is then about as deep as one that slides under the same drag.
         friction = Friction(min(drag / force, float(scene.friction.mu)), scene.friction.tau_max)
         state = _rough_slide(finger, replace(scene, friction=friction), force, deepest)
     if state is None:
         return deepest
-    # A strong drag lifts the bone, and yet more skin comes into contact, which the mesh must cover.
+    # A strong drag lifts the bone but brings more skin into contact, which the mesh must cover.
     highest = float(finger.body.condensed.rest[state.touching, 1].max())
     return max(state.load.depth, COVERED_SHARE * highest, SHALLOW)
 
@@ -389,7 +389,7 @@ def _coarse_finger(scene: Scene, depth: float) -> LinearFinger:
 
 
 def _rough_slide(finger: LinearFinger, scene: Scene, normal_force: float, deepest: float) -> EquilibriumState | None:
-    """Return the settled slide under a normal force [N/mm]; None where it is deeper than `deepest` [mm]."""
+    """Return full slip under a normal force [N/mm]; None where it is deeper than `deepest` [mm]."""
     try:
         state = slide_under(finger.newton, sliding_load(scene), normal_force, deepest)
     except ContactLost:

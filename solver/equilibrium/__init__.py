@@ -1,8 +1,8 @@
 """One load step of a body: Newton's method, which updates displacements and contact states together.
 
 The states of the skin's nodes (open, stick, slip, shear-limited) change with every iteration by a primal-dual active
-set, without a penalty (Alart and Curnier 1991; Hüeber and Wohlmuth 2005). The geometric stiffness has the pressure that
-the last iteration predicts (Magisano, Leonetti and Garcea 2017). So nearly incompressible bodies need a step or two.
+set, without a penalty (Alart and Curnier 1991; Hüeber and Wohlmuth 2005). The geometric stiffness uses the pressure
+predicted by the last iteration (Magisano, Leonetti and Garcea 2017), so nearly incompressible bodies need few steps.
 """
 
 from collections.abc import Callable
@@ -42,16 +42,16 @@ class NewtonControl:
     more than 6e-10, and the number of tangents by 3 % at most. Without keeping tangents there are 5 % more.
     """
 
-    min_damping: float = 1.0 / 16.0  # smallest part of a step, where the whole turns the body inside out
+    min_damping: float = 1.0 / 16.0  # smallest part of a step, where the whole step turns the body inside out
     max_increment: float = 0.02  # of depth or travel in one iteration, where forces are given
     max_rounds: int = 12  # changes of contact states within one linearisation: its systems are small, and so cheap
-    reuse_step: float = 0.01  # first step below which the tangent of the state before is kept
+    reuse_step: float = 0.01  # first step below which the tangent of the previous state is kept
     reuse_ratio: float = 0.02  # ratio of consecutive steps below which a new tangent is kept
-    renewal_ratio: float = 0.5  # the same ratio, above which a kept tangent is renewed
+    renewal_ratio: float = 0.5  # ratio of consecutive steps above which a kept tangent is renewed
     reuse_bulk_step: float = 1e-3  # step times bulk over shear stiffness, above which no tangent is kept
-    max_systems: int = 20  # for the contact states of a linear body, beside four for each node
+    max_systems: int = 20  # for the contact states of a linear body, plus four for each node
     ratio_safety: float = 2.0  # factor on the ratio of consecutive steps, from which the remaining step is estimated
-    error_share: float = 0.5  # part of the tolerance that the remaining step, as estimated, may take
+    error_share: float = 0.5  # part of the tolerance for the estimated remaining step
     cycle_tolerance: float = 1e-3  # relative difference below which two steps count as equal
     cycle_steps: int = 4  # equal steps in a row that count as a cycle
     divergence: float = 100.0  # displacement from which the body counts as loose
@@ -61,10 +61,10 @@ CONTROL = NewtonControl()
 
 
 class Termination(NamedTuple):
-    """When the iterations for an equilibrium end: at the larger of two errors, or with a failure at the limit."""
+    """Criteria that end the iterations: the larger of two tolerances, or a failure after too many iterations."""
 
     tolerance: float = 1e-11  # of displacements, relative to the length scale of the body [-]
-    relative_to_first: float = 0.0  # of displacements, by the largest of the first step [-]
+    relative_to_first: float = 0.0  # of displacements, relative to the largest in the first step [-]
     max_iterations: int = 25
 
 
@@ -80,7 +80,7 @@ class EquilibriumState:
     """An immutable state of a body with k nodes of skin and e elements."""
 
     u: Array  # (nodes, 2) displacements relative to the bone [mm]
-    pressure: Array  # (e, 3) modes of the pressure, as predicted for the next tangent
+    pressure: Array  # (e, 3) modes of the pressure, predicted for the next tangent
     state: States  # (k,) OPEN, STICK, SLIP or SHEAR_LIMITED
     sense: States  # (k,) direction of the friction force on the skin where it slips
     reaction: Array  # (k, 2) forces of the surface on the skin [N/mm]
@@ -99,7 +99,7 @@ class EquilibriumState:
         return body.skin_positions(self.u)
 
     def anchor(self, body: CondensedBody) -> Anchor:
-        """Return where nodes stick in a step from this state: their places, moved with the surface."""
+        """Return the positions at which nodes stick in a step from this state: they move with the surface."""
         origin, travel = self.skin_positions(body)[:, 0].copy(), self.load.travel
         return lambda load: origin + (load.travel - travel)
 
@@ -170,8 +170,8 @@ class Newton:
         """Linearise the body at `state` and solve its contact for the `steps` (2 k, 4); return False where that fails.
 
         `anchor` (k,) are the positions along x where nodes stick [mm]. Contact states change up to `rounds` times,
-        until none contradicts the linearised body. Under `forces`, the first step meets them too. With `reuse`, the
-        last tangent and its factors serve again.
+        until none contradicts the linearised body. The first step also meets the `forces`, if given. `reuse` keeps the
+        last tangent and its factors.
         """
         self.systems += 0 if reuse else 1
         body = self.condensed
@@ -207,13 +207,13 @@ class Newton:
         return SkinPosition(place[:, 0].copy(), place[:, 1] - load.depth, anchor)
 
     def force_changes(self, steps: Array) -> Array:
-        """Return the changes of the surface's force along x and y (2, c) by `steps` of the skin (2 k, c)."""
+        """Return the changes of the surface's force along x and y (2, c) for `steps` of the skin (2 k, c)."""
         return self.condensed.stiffness.reshape(-1, 2, len(steps)).sum(axis=0) @ steps
 
     def is_stable(self, state: EquilibriumState) -> bool:
-        """Return whether the energy grows with every small motion of a state that keeps its contact.
+        """Return whether every small motion of a state that keeps its contact increases the energy.
 
-        Touching nodes stay on the surface, and those that stick stay at their place. Friction forces are constant.
+        Touching nodes stay on the surface, and sticking nodes do not move. Friction forces are constant.
         """
         body, x = self.condensed, np.ascontiguousarray(state.skin_positions(self.condensed)[:, 0])
         if not self.linearise(state, state.load, x, reuse=body.equilibrium is state.u) or not body.definite:
@@ -230,7 +230,7 @@ class Newton:
     def apply_step(
         self, state: EquilibriumState, load: LoadState, skin: Array, anchor: Array, scale: float = 1.0
     ) -> tuple[EquilibriumState, float, int]:
-        """Return the state after a step of the skin (2 k,), its largest displacement [mm], and its changed states."""
+        """Return the state after a step of the skin (2 k,), its largest displacement [mm], and the changed states."""
         body, skin = self.condensed, np.ascontiguousarray(skin)
         reaction = (body.force + body.stiffness @ skin).reshape(-1, 2)
         u, pressure, largest = body.recover(state.u, state.pressure, skin, scale)
@@ -243,7 +243,7 @@ class Newton:
     ) -> tuple[EquilibriumState, float, int]:
         """Return `state` after the step of the last linearisation, its largest displacement [mm], and changed states.
 
-        Under given forces depth and travel change with it.
+        Under given forces, the step changes depth and travel too.
         """
         deeper, along = (scale * self.system.motion).tolist()
         load = state.load._replace(depth=state.load.depth + deeper, travel=state.load.travel + along)
@@ -272,14 +272,14 @@ class Newton:
     ) -> EquilibriumState:
         """Return the equilibrium one step from `start`, as `solve` does, with iterations that begin at `begin`.
 
-        Depth and travel are those of `begin`; those that are not prescribed follow from `forces`.
+        Depth and travel are those of `begin`, unless they follow from `forces`.
         """
         if forces is not None and forces.tangential is None:
             begin = replace(begin, load=begin.load._replace(travel=forces.travel))
         anchor = start.anchor(self.condensed)
         if self.condensed.constant:
             return self.solve_linear(begin, begin.load, anchor(begin.load), forces)
-        rounds = CONTROL.max_rounds if forces is None else 0  # more of them lose drags near the friction limit
+        rounds = CONTROL.max_rounds if forces is None else 0  # more rounds lose drags near the friction limit
 
         def linearise(state: EquilibriumState, *, reuse: bool = False) -> bool:
             return self.linearise(state, state.load, anchor(state.load), rounds, forces, reuse=reuse)
@@ -289,7 +289,7 @@ class Newton:
     def _iterate(
         self, begin: EquilibriumState, linearise: Callable[..., bool], anchor: Anchor, termination: Termination
     ) -> EquilibriumState:
-        """Return the equilibrium that iterations from `begin` end in. Raises NotConverged."""
+        """Return the equilibrium to which iterations from `begin` converge. Raises NotConverged."""
         state = previous = begin
         reuse = self.condensed.equilibrium is begin.u
         size = self.length_scale
@@ -323,7 +323,7 @@ class Newton:
                 return state
             new = not reuse
             still = largest < CONTROL.reuse_step * size if last == 0.0 else fall < CONTROL.renewal_ratio
-            # A kept tangent has turned by then. Its step changes volume to second order, which a stiff body resists.
+            # The body has turned since a kept tangent: steps change volume at second order, against high stiffness.
             may_turn = self.bulk * largest < CONTROL.reuse_bulk_step * size
             reuse = (still if reuse else fall < CONTROL.reuse_ratio and scale == 1.0) and may_turn
             last = largest

@@ -1,6 +1,6 @@
-"""The finger on one mesh: its body, Newton's method on it, and its receptor endings; one serves many surfaces.
+"""The finger on one mesh: its body, Newton's method on it, and its receptor endings; one finger serves many surfaces.
 
-Also the transfer of a state to another mesh of the finger, where Newton's method then needs few iterations.
+States are transferred to another mesh of the finger, where Newton's method then needs few iterations.
 """
 
 from abc import ABC, abstractmethod
@@ -43,14 +43,14 @@ PatchKind = TypeVar("PatchKind", bound=Patches, covariant=True)  # averages over
 class Finger(ABC, Generic[PatchKind]):
     """A finger on one mesh. In its frame the bone rests and the surface rises by the indentation."""
 
-    scene: Scene  # finger, materials and receptor; friction and load may be those of another surface
+    scene: Scene  # for finger, materials and receptor; its friction and load may belong to another surface
     geometry: FingerMesh
     newton: Newton
     body: Body
 
     @classmethod
     def of(cls, scene: Scene, sizing: Sizing) -> Self:
-        """Return the finger of `scene` on a new mesh; friction and loading do not matter.
+        """Return the finger of `scene` on a new mesh, whatever its friction and loading.
 
         Raises SceneError where the outline cannot be meshed, NotConverged where the stiffness is lost in round-off.
         """
@@ -107,7 +107,7 @@ class Finger(ABC, Generic[PatchKind]):
         return float(self.ending.average(displacement)[0])
 
     def seds(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return the SED of the reference ending and in its middle (c, 2) [MPa] of several states."""
+        """Return the SED averaged over the reference ending and at its midpoint (c, 2) [MPa] of several states."""
         return self.ending_and_middle(states)[:, 0]
 
     def ending_and_middle(self, states: Sequence[EquilibriumState]) -> Array:
@@ -116,15 +116,15 @@ class Finger(ABC, Generic[PatchKind]):
         return np.moveaxis(patches.responses(self.recover(states, patches)), 2, 0)
 
     def numbers(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return SED of the ending, normal and tangential force along +x (c, 3) of several states."""
+        """Return the ending's SED [MPa], the normal and the tangential force along +x [N/mm] (c, 3) of c states."""
         sed = self.ending.average(self.recover(states, self.ending))[0]
         return np.column_stack([sed, [state.force[::-1] for state in states]])
 
     def all_numbers(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return the `COUNT` numbers of each state (c, COUNT) whose errors are estimated.
+        """Return the `COUNT` results of each state (c, COUNT) whose errors are estimated.
 
-        They are the SED, both forces, depth, the bone's shift along +x, contact width, the middle's SED, and every
-        quantity at the ending.
+        They are the SED, both forces, the depth, the bone's shift along +x, the contact width, the SED at the ending's
+        midpoint, and every quantity at the ending.
         """
         return self._numbers(states, self.recover(states, self.ending_and_midpoint))
 
@@ -134,7 +134,7 @@ class Finger(ABC, Generic[PatchKind]):
         return np.column_stack([responses[0, 0], columns, responses[0, 1], responses[:, 0].T])
 
     def numbers_and_row(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return `all_numbers`, then the SED of each ending of the row (c, COUNT + r); nan where it ends."""
+        """Return `all_numbers`, then the SED of each ending of the row (c, COUNT + r); nan beyond the finger."""
         displacement = self.recover(states, self.ending_and_midpoint, self.row)
         return np.hstack([self._numbers(states, displacement), self.row.average(displacement).T])
 
@@ -166,13 +166,13 @@ class LinearFinger(Finger[LinearPatches]):
 
     @classmethod
     def on(cls, scene: Scene, geometry: FingerMesh) -> Self:
-        """Do as `Finger` says."""
+        """Assemble and condense the finger of `scene` on an existing mesh."""
         start = perf_counter()
         body = LinearBody.of(geometry.mesh, settled_moduli(scene.materials), checked=True)
         return cls(scene, geometry, Newton(body.condensed), body, perf_counter() - start)
 
     def patches(self, endings: Endings) -> LinearPatches:
-        """Do as `Finger` says."""
+        """Return averages over `endings` on the mesh."""
         return LinearPatches(self.body.elastic, endings)
 
     @cached_property
@@ -188,7 +188,7 @@ class LinearFinger(Finger[LinearPatches]):
         return sizes[large, None] * turns[large]
 
     def reaches_out(self, state: EquilibriumState, displacement: Array, indentation: float) -> bool:
-        """Return whether skin would touch outside the part that may, so that this part must be larger."""
+        """Return whether skin touches outside the part that may, so that this part must be larger."""
         skin = self.geometry.all_skin
         below = self.geometry.mesh.nodes[skin, 1] + displacement[skin, 1] < indentation * (1.0 - 1e-9)
         may = np.zeros(len(displacement), bool)
@@ -206,16 +206,16 @@ class FiniteFinger(Finger[FinitePatches]):
 
     @classmethod
     def on(cls, scene: Scene, geometry: FingerMesh) -> Self:
-        """Do as `Finger` says."""
+        """Return the finger of `scene` on an existing mesh."""
         body = FiniteBody.of(geometry.mesh, finite_laws(scene.materials), checked=True)
         return cls(scene, geometry, Newton(body.condensed), body)
 
     def patches(self, endings: Endings) -> FinitePatches:
-        """Do as `Finger` says."""
+        """Return averages over `endings` on the mesh."""
         return FinitePatches(self.body, endings)
 
     def transfer(self, state: EquilibriumState, source: "FiniteFinger") -> EquilibriumState:
-        """Return `state` of the mesh of `source`, interpolated to this mesh as a start."""
+        """Return `state`, a state on the mesh of `source`, interpolated to this mesh as a start."""
         if source not in self._bridges:
             self._bridges[source] = MeshTransfer.of(source.places, self.places)
         return self._bridges[source].transfer_state(state)
@@ -242,7 +242,7 @@ class FiniteFinger(Finger[FinitePatches]):
 
 
 def cached_finger(kind: type[FingerKind], scene: Scene, sizing: Sizing) -> FingerKind:
-    """Return the finger of `Finger.of`, kept for consecutive surfaces of one finger in one thread."""
+    """Return the finger of `Finger.of`, cached for consecutive surfaces of one finger in one thread."""
     return cast("FingerKind", _cached_finger(kind, scene, sizing, get_ident()))
 
 
@@ -255,7 +255,7 @@ KINDS: Mapping[str, type[Finger[Any]]] = {"small": LinearFinger, "finite": Finit
 
 
 def settled_moduli(materials: Materials) -> list[Moduli]:
-    """Return the small-strain moduli of the settled response, which are those of relaxed tissues."""
+    """Return the small-strain moduli of the settled response: those of relaxed tissues."""
     return [law.long_term_moduli for law in relaxing_laws(materials)]
 
 
@@ -295,7 +295,7 @@ class GridPositions:
 
     @staticmethod
     def of(finger: FingerMesh, body: FiniteBody) -> "GridPositions":
-        """Return the places of a mesh."""
+        """Return the positions of a mesh."""
         arcs, heights = with_middles(finger.arcs), _heights(finger)
         skin = finger.skin_arcs
         lengths = np.empty(len(skin))
@@ -311,11 +311,11 @@ class MeshTransfer:
     old: GridPositions
     new: GridPositions
     along: Indices  # (2 a + 1,) first of the three old lines along the skin for each new one
-    along_parts: Array  # (2 a + 1, 3) their weights
-    across: Indices  # (2 b + 1,) the same of rows
-    across_parts: Array  # (2 b + 1, 3)
+    along_parts: Array  # (2 a + 1, 3) weights of the three lines
+    across: Indices  # (2 b + 1,) first of the three old rows for each new one
+    across_parts: Array  # (2 b + 1, 3) weights of the three rows
     station: Indices  # (a, 3) old columns that hold the new quadrature points
-    layer: Indices  # (b, 3) old rows
+    layer: Indices  # (b, 3) old rows that hold them
     forces: Array  # (k, old k) maps the old skin's forces, whose line density is linear between nodes
     nearest: Indices  # (k,) nearest old node of the skin
     driven: Flags  # (nodes, 2) held components of the new nodes
@@ -332,7 +332,7 @@ class MeshTransfer:
         return MeshTransfer(old, new, *along, *across, station, layer, forces, nearest, new.body.mesh.driven)
 
     def transfer_state(self, state: EquilibriumState) -> EquilibriumState:
-        """Return `state` of the old mesh as a start on the new one."""
+        """Return `state`, a state on the old mesh, as a start on the new mesh."""
         return self.touch(state, *self.fields(state.u, state.pressure))
 
     def touch(self, start: EquilibriumState, u: Array, pressure: Array) -> EquilibriumState:
@@ -345,8 +345,8 @@ class MeshTransfer:
         """Return displacements `u` [mm] (nodes, 2) and modes of `pressure` (e, 3) on the new mesh.
 
         Displacements are interpolated by the shape functions in arc position and height, so that the transfer of a mesh
-        to itself is exact. Pressures are interpolated too: a nearly incompressible body would make large ones from the
-        small volume changes of interpolated displacements.
+        to itself is exact. Pressures are interpolated too, because in a nearly incompressible body the small volume
+        changes of interpolated displacements would give large ones.
         """
         old, new, three = self.old.body, self.new.body, np.arange(3)
         grid = u.reshape(len(self.old.arcs), len(self.old.heights), 2)
@@ -363,7 +363,7 @@ class MeshTransfer:
 
 
 def _inner(lines: Array) -> Array:
-    """Return the three quadrature points (n, 3) between each two of `lines` (n + 1,)."""
+    """Return the three quadrature points (n, 3) between consecutive `lines` (n + 1,)."""
     return lines[:-1, None] + np.diff(lines)[:, None] * (1.0 + Q2P1.points[:3, 0]) / 2.0
 
 

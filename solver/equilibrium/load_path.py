@@ -1,6 +1,6 @@
 """The load path of a finger in time: a press over 1 s, then a slide until the state is settled, or a drag.
 
-Where tissues relax, a wait for their relaxation follows. `LoadSteps` has the load steps.
+Where tissues relax, the path ends with a wait for their relaxation. `LoadSteps` defines the load steps.
 """
 
 from collections.abc import Callable
@@ -29,22 +29,22 @@ from solver.scene.tables import Loading, Materials
 
 PRESSING_TIME = 1.0  # duration of the press [s]
 DRAGGING_TIME = 1.0  # duration of the growth of a given tangential force [s]
-FULL_SLIP_TOLERANCE = 1e-6  # relative difference of a given drag from the friction limit at which all slips
+FULL_SLIP_TOLERANCE = 1e-6  # relative difference of a given drag from the friction limit that counts as full slip
 SED_TOLERANCE = 1e-10  # relative change of the ending's SED per step below which a slide at finite strain is settled
 _CONTROL = StepControl(min_step=2.0**-13, step_growth=2.0)
-Report = Callable[[str, float], None]  # called with a text and the fraction of the load path that is done
+Report = Callable[[str, float], None]  # called with a text and the completed fraction of the load path
 
 
 @dataclass(frozen=True, slots=True)
 class LoadSteps:
     """The load steps of a path; lengths are relative to the indentation."""
 
-    press_steps: int  # of a drag too
+    press_steps: int  # also of a drag
     first_slide_step: float
     slide_growth: float  # ratio of consecutive steps
     max_slide_step: float
-    max_slide: float  # after which a state that still changes is refused
-    plateau_steps: int = 0  # beyond the settled state, which show that it stays
+    max_slide: float  # slide after which a state that still changes is refused
+    plateau_steps: int = 0  # steps beyond the settled state, which show that it does not change
     tolerance: float = 0.0  # of displacements; a body of constant stiffness needs none
 
     def finer(self, step_factor: float) -> "LoadSteps":
@@ -64,17 +64,17 @@ FINITE_STEPS = LoadSteps(40, first_slide_step=0.1, slide_growth=1.0, max_slide_s
 RELAXING_STEPS = LoadSteps(
     25, first_slide_step=0.02, slide_growth=1.2, max_slide_step=0.1, max_slide=25.0, tolerance=1e-8
 )
-USUAL_SLIDE = 25.0  # slide relative to the indentation, within which states settle, except near the wedging limit
+USUAL_SLIDE = 25.0  # slide within which states settle, relative to the indentation, except near the wedging limit
 
 
 @dataclass(frozen=True, slots=True)
 class RelaxationSteps:
     """The steps of the wait for relaxation at the end of a load path."""
 
-    min_wait: float = 14.0  # relative to the largest relaxation time: e^-14 is 8e-7
-    equal_steps: int = 6  # of one length, before it doubles
-    sed_tolerance: float = 1e-6  # relative change of the SED over equal steps below which it is relaxed
-    max_doublings: int = 60  # of the step
+    min_wait: float = 14.0  # relative to the largest retardation time: e^-14 is 8e-7
+    equal_steps: int = 6  # steps of one length, before the length doubles
+    sed_tolerance: float = 1e-6  # relative change of the SED over equal steps below which tissue is relaxed
+    max_doublings: int = 60  # of the step length
 
 
 RELAXATION_STEPS = RelaxationSteps()
@@ -123,11 +123,10 @@ class LoadPath:
     ) -> None:
         """Start undeformed, with mu and bound of `friction`; `loading` prescribes depth or forces.
 
-        `tolerance` is that of displacements relative to the indentation, where that is given. `tissue` is one that
-        relaxes.
+        `tolerance` is that of displacements relative to a given indentation. `tissue` is given where tissues relax.
         """
         self.tissue = tissue
-        self.energies: list[Array] = []  # of its endings, at every instant after the first [MPa]
+        self.energies: list[Array] = []  # of the endings in relaxing tissue, at every instant after the first [MPa]
         self.sense = 0  # direction of the friction force on relaxing skin; 0: unknown
         self.newton = newton
         self._termination = Termination(tolerance * (loading.indentation or 0.0) / newton.length_scale)
@@ -145,7 +144,7 @@ class LoadPath:
         return self.instants[-1].state
 
     def advance_to(self, point: LoadPoint) -> None:
-        """Append the state at `point`; a step that fails is halved, and its intermediate states are appended too."""
+        """Append the state at `point`; a step that fails is halved, which appends intermediate states too."""
         begin = self.point
 
         def step(part: float) -> None:
@@ -183,11 +182,11 @@ def march_scene(
     relaxing: bool = False,
     report: Report = report_progress,
 ) -> LoadPath:
-    """Return the load path of a scene by backward Euler steps: the press, then settled slides or a drag.
+    """Return the load path of a scene by backward Euler steps: the press, then slides until they settle, or a drag.
 
     It takes `step_factor` times the usual steps. With `relaxing` the tissues relax, and a wait for them ends the path;
-    else they are relaxed from the start. A given drag must be less than the friction limit. Raises NotConverged where a
-    step fails or a slide does not settle, Cancelled.
+    otherwise they are relaxed from the start. A given drag must be less than the friction limit. Raises NotConverged
+    where a step fails or a slide does not settle, Cancelled.
     """
     steps, loading = steps_of(finger, relaxing=relaxing).finer(step_factor), scene.loading_per_mm
     path = undeformed_path(scene, finger, relaxing=relaxing)
@@ -207,8 +206,8 @@ def slide_or_hold(
 ) -> EquilibriumState:
     """Return the state under the normal force of a scene: `slide`, or `hold` for a drag below the friction limit.
 
-    A drag may have a state where sliding has none. Raises NoSteadyState where it exceeds the friction limit, and as
-    `slide` and `hold` do.
+    A drag may have a state where full slip does not exist. Raises NoSteadyState for a drag beyond the friction limit,
+    and as `slide` and `hold` do.
     """
     force, drag = scene.normal_force, scene.tangential_force
     try:
@@ -231,7 +230,7 @@ def steps_of(finger: Finger[Patches], *, relaxing: bool = False) -> LoadSteps:
 
 
 def undeformed_path(scene: Scene, finger: Finger[Patches], *, relaxing: bool = False) -> LoadPath:
-    """Return the load path of a scene at its beginning, undeformed."""
+    """Return the load path of a scene at its undeformed beginning."""
     tissue = tissue_of(scene, finger) if relaxing else None
     tolerance = steps_of(finger, relaxing=relaxing).tolerance
     return LoadPath(finger.newton, load_of(scene), scene.loading_per_mm, tolerance, tissue)
@@ -281,7 +280,7 @@ def _reason(path: LoadPath) -> str:
 
 
 class _SettlingCriterion:
-    """Criterion for a settled slide, evaluated before every step."""
+    """Criterion that a slide is settled, evaluated before every step."""
 
     def __init__(self, path: LoadPath, finger: Finger[Patches], direction: int, step_factor: float) -> None:
         self._path, self._finger, self._direction, self._step_factor = path, finger, direction, step_factor
@@ -290,8 +289,8 @@ class _SettlingCriterion:
     def __call__(self) -> bool:
         """Return whether the slide is settled.
 
-        At small strain it is once every point in contact slips against the slide. At finite strain the ending's SED
-        must be constant too, unless tissues relax, for which a wait follows.
+        At small strain every point in contact must slip against the slide. At finite strain the ending's SED must be
+        constant too, unless tissues relax, for which a wait follows.
         """
         state = self._path.last
         if isinstance(self._finger, LinearFinger):
@@ -305,7 +304,7 @@ class _SettlingCriterion:
 
 
 def _slide(path: LoadPath, speed: float, steps: LoadSteps, settled: Callable[[], bool], report: Report) -> None:
-    """Append the states of a slide until it is settled, and the plateau beyond. Raises NotConverged."""
+    """Append the states of a slide until it is settled, and the plateau that follows. Raises NotConverged."""
     start, depth = path.point, path.instants[-1].depth
     step, distance = steps.first_slide_step * depth, 0.0
     direction, longest = np.sign(speed).item(), min(USUAL_SLIDE, steps.max_slide) * depth
@@ -331,11 +330,11 @@ def _slide(path: LoadPath, speed: float, steps: LoadSteps, settled: Callable[[],
 def _relax(path: LoadPath, loading: Loading, slowest: float, step_factor: float, report: Report) -> None:
     """Append states in doubling steps until the `slowest` tissue [s] has relaxed, while a slide continues.
 
-    Near a limit of sliding a body relaxes more slowly than its tissues, so that the energy must be constant too.
+    Near a limit of full slip a body relaxes more slowly than its tissues, so that the energy must be constant too.
     """
     speed = 0.0 if loading.dragged else loading.direction * loading.speed
     if not isinstance(path.tissue, LinearTissue):
-        path.sense = -int(np.sign(speed))  # by now all skin in contact slips
+        path.sense = -int(np.sign(speed))  # here all skin in contact slips
     step, elapsed, longest = path.instants[-1].time - path.instants[-2].time, 0.0, RELAXATION_STEPS.min_wait * slowest
     for _ in range(RELAXATION_STEPS.max_doublings):
         previous = path.energies[-1][0]

@@ -1,8 +1,8 @@
-"""Load stepping with the solver's only cut-back, force control, and settled slides in one step.
+"""Load stepping with the solver's only cut-back, force control, and full slip in one step.
 
-Under given forces, depth and travel are unknown too: Newton's method on the bordered system. Every linear solve returns
-the derivatives by depth and travel, from which the changes of both follow that balance the forces. In a settled slide
-every point in contact slips, so that the state does not depend on its load path.
+Under given forces, depth and travel are unknown too: Newton's method solves the bordered system. Every linear solve
+also returns the derivatives with respect to depth and travel. These give the changes of both that balance the forces.
+In full slip every point in contact slips, so that the state does not depend on its load path.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -21,13 +21,13 @@ from solver.failures import ContactLost, NotConverged, at_end_of_path
 from solver.progress import check_stop, report_progress
 from solver.scene import Scene
 
-DRAG_TOLERANCE = 1e-9  # error of a drag that is met, relative to the friction limit
-_UNDER_FORCES = Termination(max_iterations=30)  # the depth is searched too
+DRAG_TOLERANCE = 1e-9  # accepted error of a drag, relative to the friction limit
+_UNDER_FORCES = Termination(max_iterations=30)  # more than usual, since the depth is unknown too
 
 
 @dataclass(frozen=True, slots=True)
 class StepControl:
-    """How a load path is cut into steps; lengths are fractions of the path."""
+    """Division of a load path into steps; lengths are fractions of the path."""
 
     first_step: float = 1.0
     min_step: float = 2.0**-8
@@ -44,9 +44,9 @@ def advance(
 ) -> None:
     """Call `step` with growing fractions of the path up to 1; halve the step that fails.
 
-    `step` raises NotConverged where it fails, and leaves the state as it was. Where the next step is too short, or the
-    work is `exhausted`, this raises the exception that `refusal` returns for the fraction reached, that step and the
-    reason. Raises Cancelled.
+    `step` raises NotConverged where it fails, and leaves the state unchanged. Where the next step is too short, or the
+    allowed work is `exhausted`, this raises the exception that `refusal` returns for the fraction reached, this step
+    and the reason. Raises Cancelled.
     """
     fraction, part = 0.0, control.first_step
     while fraction < 1.0:
@@ -70,7 +70,7 @@ def load_of(scene: Scene) -> LoadState:
 
 
 def sliding_load(scene: Scene) -> LoadState:
-    """Return the load state of a scene's settled slide, along +x where the scene has no direction."""
+    """Return the load state of a scene's full slip, along +x where the scene has no direction."""
     return load_of(scene)._replace(sense=-(scene.loading.direction or 1))
 
 
@@ -93,7 +93,7 @@ def march(
 
     A load is a load state, or forces under the friction of `start`. Backward Euler: within a step a point sticks where
     it was, or slips from there. `tolerance` is that of displacements, relative to the length scale of the body. Raises
-    NotConverged, saying where, Cancelled, and ValueError for a load that is not allowed.
+    NotConverged with the depth and travel reached, Cancelled, and ValueError for a load that is not allowed.
     """
     state, end = EquilibriumState.undeformed(newton.condensed) if start is None else start, Termination(tolerance)
     for number, aim in enumerate(aims := [aim.validate() for aim in course]):
@@ -121,10 +121,10 @@ _MAX_EVALUATIONS = 60  # within the bracket
 def find_root(
     function: Callable[[float], tuple[float, State]], start: float, close: float, size: float = 1.0
 ) -> State | None:
-    """Return the state at the root of an increasing function, to within `close`; None where there is no bracket.
+    """Return the state at the root of an increasing function, to within `close`; None where no bracket is found.
 
-    `function` returns its value at a place, and the state there. Strides from `start` that double find a bracket, up to
-    a part of `size`. Regula falsi with the Illinois rule finds the root (Dowell and Jarratt 1971).
+    `function` returns its value at an argument, and the state there. Doubling strides from `start` find a bracket, up
+    to a part of `size`. Regula falsi with the Illinois rule finds the root (Dowell and Jarratt 1971).
 
     >>> round(find_root(lambda x: (x**3 - 8e-9, x), 0.0, 1e-18), 9)
     0.002
@@ -197,19 +197,19 @@ def _find_travel(
 
 @dataclass(frozen=True, slots=True)
 class SlipControl:
-    """First guesses of the contact of a slide, and the cut-back where one step does not reach it.
+    """First guesses of the contact in full slip, and the cut-back where one step does not reach it.
 
-    Halving or doubling the numbers for finite strain changed neither states nor tangents of sixteen slides.
+    Halving or doubling the values for finite strain changed neither states nor tangents of sixteen slides.
     """
 
     hertz_overlap: float = (
-        0.5  # relative to the depth, from which skin is guessed to touch: in Hertz' contact half does
+        0.5  # relative to the depth, from which skin is guessed to touch: in Hertzian contact half does
     )
     max_hertz_systems: int = 12  # for that guess
     overlaps: tuple[float, ...] = (0.3, 0.6, 0.1, 0.9, 0.03, 0.01)  # relative to the depth, tried in turn
     intermediate_tolerance: float = 1e-4  # tolerance of steps before the last [-]; looser ones diverge near nu = 0.5
-    max_tangents: int = 160  # then no more steps are halved: 80 lose deep presses, 320 gain none
-    min_step: float = 1.0 / 64.0  # by the path
+    max_tangents: int = 160  # after which no step is halved: 80 lose deep presses, 320 gain none
+    min_step: float = 1.0 / 64.0  # fraction of the path
 
 
 SLIP_CONTROL = SlipControl()
@@ -218,7 +218,7 @@ SLIP_CONTROL = SlipControl()
 def solve_full_slip(
     newton: Newton, load: LoadState, start: EquilibriumState | None = None, tolerance: float = TO_ROUND_OFF.tolerance
 ) -> EquilibriumState:
-    """Return the settled slide under `load` (sense +1 or -1), in one step from `start` or the undeformed state.
+    """Return full slip under `load` (sense +1 or -1), in one step from `start` or the undeformed state.
 
     A step that fails is halved in depth, friction and bound together. `tolerance` is as in `march`. Raises NotConverged
     where that does not help, Cancelled, and ValueError for a load state that is not allowed.
@@ -250,7 +250,7 @@ def solve_full_slip(
 
 
 def _linear_slide(newton: Newton, load: LoadState, start: EquilibriumState | None) -> EquilibriumState:
-    """Return the settled slide of a body of constant stiffness in one step. Raises ContactLost.
+    """Return full slip of a body of constant stiffness in one step. Raises ContactLost.
 
     The first guess of its contact is that of `start`, or the skin that overlaps the surface.
     """
@@ -278,7 +278,7 @@ def _linear_slide(newton: Newton, load: LoadState, start: EquilibriumState | Non
 def slide_from_guess(
     newton: Newton, load: LoadState, guess: NDArray[np.integer], force: float | None = None, rounds: int | None = None
 ) -> EquilibriumState:
-    """Return the settled slide of a body of constant stiffness from a `guess` (k,) of its contact states.
+    """Return full slip of a body of constant stiffness from a `guess` (k,) of its contact states.
 
     Under a normal `force` [N/mm] the depth is unknown. Raises ContactLost, at the latest after `rounds` systems.
     """
@@ -290,7 +290,7 @@ def slide_from_guess(
 
 
 def slide_under(newton: Newton, load: LoadState, force: float, deepest: float | None = None) -> EquilibriumState:
-    """Return the settled slide of a body of constant stiffness under a normal `force` [N/mm].
+    """Return full slip of a body of constant stiffness under a normal `force` [N/mm].
 
     `deepest` [mm] scales the first guesses of the depth, by default the height of the skin. Raises ContactLost.
     """
@@ -302,7 +302,7 @@ def slide_under(newton: Newton, load: LoadState, force: float, deepest: float | 
 
 
 def _slide_from_guesses(newton: Newton, load: LoadState, scale: float, force: float | None) -> EquilibriumState:
-    """Return the first slide found from guesses of contact up to parts of a `scale` [mm] above the lowest node."""
+    """Return full slip from the first successful guess of contact: parts of `scale` [mm] above the lowest node."""
     height = newton.condensed.skin_positions(newton.condensed.undeformed()[0])[:, 1]
     guesses = [np.where(height <= float(height.min()) + part * scale, SLIP, OPEN) for part in SLIP_CONTROL.overlaps]
     for guess in guesses[:-1]:

@@ -11,9 +11,9 @@ A step is then elastic, with the moduli `Prony.within(dt)` and the stress of the
 is the energy stored in all springs of the solid, G (1 - sum g) e:e + sum g G h:h + K/2 theta^2, with the strain
 deviator e.
 
-At finite strain there are a relaxed law and an overstress (`constitutive.Past`), which vanishes in the end. A finger
-carries its own skin along the surface. A settled slide is therefore at rest in the tissue and wholly relaxed, whatever
-its speed.
+At finite strain the stress is that of a relaxed law plus an overstress (`constitutive.Past`), which decays to zero. A
+finger carries its skin along the surface. In settled sliding the tissue is therefore at rest and fully relaxed at any
+speed.
 """
 
 from collections.abc import Callable, Sequence
@@ -42,7 +42,7 @@ class Tissue(Protocol):
         """Prepare a time step [s] and return Newton's method on the body of that step."""
 
     def commit(self, state: EquilibriumState, step: float) -> Array:
-        """Take the step that was prepared, to `state`; return the energy stored at each ending (r,) [MPa]."""
+        """Take the prepared step to `state`; return the energy stored at each ending (r,) [MPa]."""
 
 
 class RelaxingBody:
@@ -80,7 +80,7 @@ class RelaxingBody:
     def ready(self, step: float, prescribed: Array | None = None) -> CondensedLinear:
         """Return the condensed body at the end of a `step` [s], with the stress of its past as a load.
 
-        Held nodes are then displaced by `prescribed` (nodes, 2) [mm] relative to the drive.
+        At that instant held nodes are displaced by `prescribed` (nodes, 2) [mm] relative to the drive.
         """
         form = self._elastic_body(float(f"{step:.9e}"))  # steps that differ by round-off share factors
         past = self._past(step)
@@ -96,7 +96,7 @@ class RelaxingBody:
         return body
 
     def advance(self, u: Array) -> None:
-        """Take the step that was prepared, to displacements `u` (k, 2) of the skin [mm]."""
+        """Take the prepared step to displacements `u` (k, 2) of the skin [mm]."""
         assert self._next is not None
         recover, step = self._next
         after = recover(u)
@@ -134,7 +134,7 @@ class RelaxingBody:
         return np.sum(strain * strain, axis=(1, 2)) - theta**2 / 3.0, theta
 
     def _past(self, step: float) -> Array:
-        """Return the element displacements (e, 18) whose instantaneous shear stress is that of the past."""
+        """Return the element displacements (e, 18) whose instantaneous shear stress equals that of the past."""
         local = self.mesh.local(self.displacement).reshape(-1, 18)
         ages = step / self._tau
         internal = np.einsum("eim,em->ei", self._internal, self._g * np.exp(-ages))
@@ -160,7 +160,7 @@ class CondensedRelaxing(CondensedFinite):
         self.equilibrium = None
 
     def commit(self, u: Array, step: float) -> None:
-        """Take the step that was prepared, to displacements `u` (nodes, 2)."""
+        """Take the prepared step to displacements `u` (nodes, 2)."""
         self.past = self.past.after(self.body.deformation(u).reshape(-1, 2, 2), step)
 
     def assemble(self, u: Array, pressure: Array) -> float:
@@ -187,7 +187,7 @@ class CondensedRelaxing(CondensedFinite):
         )
 
     def stored_energy(self, u: Array, reaction: Array) -> float:
-        """Return the energy stored at `u`, with that of the overstress at the last committed instant."""
+        """Return the energy stored at `u`, including the overstress's at the last committed instant [N mm per mm]."""
         return super().stored_energy(u, reaction) + float(self.past.energy() @ self.body.elements.weight.ravel())
 
 
@@ -215,11 +215,11 @@ class LinearTissue:
         self._body, self._endings = body, endings
 
     def ready(self, step: float) -> Newton:
-        """Do as `Tissue` says."""
+        """Prepare a time step [s] and return Newton's method on its elastic body."""
         return Newton(self._body.ready(step))
 
-    def commit(self, state: EquilibriumState, step: float) -> Array:  # noqa: ARG002 - `ready` has it
-        """Do as `Tissue` says."""
+    def commit(self, state: EquilibriumState, step: float) -> Array:  # noqa: ARG002 - `ready` has stored it
+        """Take the prepared step to `state`; return the energy stored at each ending (r,) [MPa]."""
         self._body.advance(state.u)
         return self._body.average(self._endings)
 
@@ -234,12 +234,12 @@ class FiniteTissue:
         self._past = _at_rest(laws, body.mesh.region[patches.endings.probes.element])
 
     def ready(self, step: float) -> Newton:
-        """Do as `Tissue` says."""
+        """Prepare a time step [s] and return Newton's method on the relaxing body."""
         self._relaxing.ready(step)
         return self._newton
 
     def commit(self, state: EquilibriumState, step: float) -> Array:
-        """Do as `Tissue` says."""
+        """Take the prepared step to `state`; return the energy stored at each ending (r,) [MPa]."""
         self._relaxing.commit(state.u, step)
         self._past = self._past.after(self._patches.deformation(state.u), step)
         return self._patches.endings.means(self._patches.energy(state.u) + self._past.energy())

@@ -1,6 +1,6 @@
 """Elements and meshes: nodes, nine-node quadrilaterals, regions, the skin that may touch, and driven nodes.
 
-Any mesh can be refined by halves: each element is divided in four by its own quadratic geometry, so the meshes nest.
+Any mesh can be halved: each element is divided in four by its quadratic geometry, so the meshes nest.
 """
 
 import math
@@ -71,7 +71,7 @@ def distinct(numbers: NDArray[Numbers]) -> NDArray[Numbers]:
     >>> distinct(np.array([3, 1, 3]))
     array([1, 3])
     """
-    # several times as fast for few numbers as np.unique, which imports masked arrays
+    # several times as fast for a few numbers as np.unique, which imports masked arrays
     numbers = np.sort(numbers, axis=None)
     new = np.ones(len(numbers), bool)
     new[1:] = numbers[1:] != numbers[:-1]
@@ -95,12 +95,12 @@ class Mesh:
     skin: Indices  # (2 k + 1,) nodes that may touch, along k edges: end, middle, end, middle, ... end
     held: Indices  # (h,) nodes driven in both directions
     held_x: Indices = field(default_factory=lambda: _NONE)  # nodes driven along x and free along y
-    held_y: Indices = field(default_factory=lambda: _NONE)  # likewise along y: rollers, and planes of symmetry
+    held_y: Indices = field(default_factory=lambda: _NONE)  # nodes driven along y: rollers, planes of symmetry
 
     def __post_init__(self) -> None:
-        """Copy the arrays, so that nobody can change them, with lengths and whole numbers in the types of the loops.
+        """Copy the arrays, read-only, with lengths and integers in the types of the kernels.
 
-        Other types are left alone; `solver.body.validation` refuses them where a body is made.
+        Other types stay unchanged; `solver.body.validation` refuses them when a body is made.
         """
         for f in fields(self):
             array = np.array(getattr(self, f.name))
@@ -118,7 +118,7 @@ class Mesh:
 
     @cached_property
     def length_scale(self) -> float:
-        """Length by which displacements count as small or large: the root of the area [mm].
+        """Length relative to which displacements are small or large: the root of the area [mm].
 
         >>> two_by_half = np.moveaxis(np.mgrid[:9, :3] / 4.0, 0, -1)
         >>> round(grid_mesh(two_by_half, np.zeros(1), slice(0, 1), np.zeros(0)).length_scale, 3)
@@ -143,7 +143,7 @@ class Mesh:
     def local(self, field: Array, element: Indices | None = None) -> Array:
         """Return the nodal values (e, 9, ...) of a `field` (n, ...) in all elements, or in those numbered `element`."""
         nodes = self.elements if element is None else self.elements.take(element, axis=0)
-        return field.take(nodes, axis=0)  # ten times as fast as to index with an array
+        return field.take(nodes, axis=0)  # ten times as fast as indexing with an array
 
     def about_centre(self, field: Array, element: Indices | None = None) -> Array:
         """Return `local` less the value at the centre: a translation would drown small strains in round-off."""
@@ -158,8 +158,8 @@ class Mesh:
         )
 
 
-# node offsets of an element along the grid's two directions, the first of which turns to the second clockwise
-# (as from proximal to distal, then outwards to the skin)
+# node offsets of an element along the grid's two directions; the second is clockwise from the first
+# (for example, from proximal to distal, and outwards to the skin)
 ALONG = np.array([0, 0, 2, 2, 0, 1, 2, 1, 1])
 OUT = np.array([0, 2, 2, 0, 1, 2, 1, 0, 1])
 
@@ -215,13 +215,13 @@ def jacobians(mesh: Mesh, points: Array) -> tuple[Array, Array]:
 def integrals(mesh: Mesh) -> tuple[Array, ...]:
     """Return gradients along x and y, weights, modes, Laplacian, centre and combination of the elements of `mesh`.
 
-    The first five are as in `arrays.ElementArrays`. The centre (e, 2) and combination (e, 3, 3) are of the modes,
-    which are 1, x, y about the centre, made orthonormal by the Cholesky factor of their mass matrix. Raises MeshError
-    where an element is folded.
+    The first five are as in `arrays.ElementArrays`. The centre (e, 2) and combination (e, 3, 3) define the modes: 1, x,
+    y about the centre, made orthonormal by the Cholesky factor of their mass matrix. Raises MeshError where an element
+    is folded.
     """
     jacobian, det = jacobians(mesh, Q2P1.points)
     values, slopes = Q2P1.shape(Q2P1.points)
-    by_local = inverse(jacobian)[..., None]  # (e, q, 2, 2, 1) derivatives of the local coordinates by x and y
+    by_local = inverse(jacobian)[..., None]  # (e, q, 2, 2, 1) derivatives of local coordinates: d/dx, d/dy
     xi, eta = np.ascontiguousarray(np.moveaxis(slopes, 2, 0))  # (9, 9) each
     grad_x, grad_y = (by_local[:, :, 0, k] * xi + by_local[:, :, 1, k] * eta for k in (0, 1))
     points = values @ mesh.local(mesh.nodes)
@@ -251,7 +251,7 @@ def block(x_lines: Array, y_lines: Array, radius: float = np.inf, *, held: bool 
     """Return a block on the surface, with lines between elements at `x_lines` and `y_lines` (from 0 up) [mm].
 
     Its underside may touch: it is flat, or a circle of `radius` [mm] that touches the surface at x = 0. With `held`,
-    its top is driven, else nothing is.
+    its top is driven, otherwise no node is.
     """
     x, y = with_middles(x_lines), with_middles(y_lines)[::-1]
     bottom = 0.0 * x if np.isinf(radius) else radius - np.sqrt(radius**2 - x**2)
@@ -264,7 +264,7 @@ def block(x_lines: Array, y_lines: Array, radius: float = np.inf, *, held: bool 
 
 
 def with_middles(lines: Array) -> Array:
-    """Return the lines with one more in the middle of each gap."""
+    """Return the lines with an additional one in the middle of each gap."""
     out = np.empty(2 * len(lines) - 1)
     out[::2], out[1::2] = lines, (lines[1:] + lines[:-1]) / 2.0
     return out
@@ -277,7 +277,7 @@ class Lines:
     arcs: tuple[float, ...]  # arc positions of the lines across the tissue [mm]
     bone: tuple[
         float, ...
-    ]  # of those along it in a meshed bone: radii from the core to 1, relative to the bone's; else none
+    ]  # radii of the lines along a meshed bone, from the core to 1, relative to the bone's radius; else empty
     fat: tuple[float, ...]  # heights in the fat, from 0 on the bone to 1
     skin: tuple[float, ...]  # depths in the skin, the outermost last [mm]
 
@@ -336,7 +336,7 @@ class HalvedMesh:
         host = np.concatenate([first // len(ends), np.repeat(np.arange(len(elements)), len(inner))])
         local_number = np.concatenate([places[first % len(ends)], np.tile(inner, len(elements))])
         new = _VALUES[local_number]
-        # A new node is driven where all nodes of its side, or of its element, are.
+        # A new node is driven if all nodes of its side, or of its element, are.
         held = mesh.driven[elements[host]] | (new == 0.0)[..., None]
         driven = np.concatenate([mesh.driven, held.all(axis=1)])
         nodes = np.concatenate([mesh.nodes, np.einsum("mn,mnd->md", new, mesh.nodes[elements[host]])])
@@ -354,7 +354,7 @@ class HalvedMesh:
         return _refine_chain(nodes, self._pairs, len(self._coarse.nodes))
 
     def between(self, values: Array) -> Array:
-        """Return nodal values (n, ...) of the coarse mesh and, interpolated, those of the new nodes."""
+        """Return nodal values (n, ...) of the coarse mesh, then those interpolated at the new nodes."""
         local = values[self._coarse.elements[self._of]]
         return np.concatenate([values, np.einsum("mn,mn...->m...", self._new, local)])
 
@@ -364,7 +364,7 @@ def _pair(end: Indices, middle: Indices, count: int) -> Indices:
 
 
 def _refine_chain(nodes: Indices, pairs: Indices, count: int) -> Indices:
-    """Return a chain of nodes (2 k + 1,) with the new node between each two."""
+    """Return a chain of nodes (2 k + 1,) with the new nodes between them."""
     ends, middles = nodes[:-1].copy(), nodes[1:].copy()
     ends[1::2], middles[1::2] = nodes[2::2], nodes[1::2]
     out = np.empty(max(2 * len(nodes) - 1, 0), np.int64)

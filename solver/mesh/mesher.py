@@ -22,7 +22,7 @@ from solver.scene.tables import Finger, Receptor
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """Geometry of one finger's outline. Arc positions and depths in mm; any shape, broadcast together."""
+    """Geometry of one finger's outline. Arc positions and depths are in mm and broadcast together."""
 
     finger: Finger
     palmar_cut: float  # arc position of the cut's palmar end
@@ -117,9 +117,9 @@ class Outline:
 
 
 EPIDERMIS, DERMIS, FAT, BONE = 0, 1, 2, 3  # numbers of the regions
-CORE = 1.0 / 3.0  # radius of a meshed bone's driven core, relative to the bone's [-]
-FOLD = (0.015, 0.1)  # element size where the skin folds: the smaller part, of the tip radius or of the epidermis
-FINEST = 1e-3  # smallest element relative to the tip radius: round-off swamps thinner ones across the whole finger [-]
+CORE = 1.0 / 3.0  # radius of a meshed bone's driven core, relative to the bone's radius [-]
+FOLD = (0.015, 0.1)  # element size at a fold: the smaller of these parts of the tip radius and of the epidermis
+FINEST = 1e-3  # smallest element relative to the tip radius: round-off swamps thinner ones that cross the finger [-]
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,23 +128,23 @@ class ElementSizes:
 
     in_contact: float = 0.5  # along the skin that may touch
     palmar_growth: float = 1.0  # outside the contact: skin behind it is compressed, and may fold
-    dorsal_growth: float = 1.9  # likewise
-    aspect: float = 1.7  # across the skin at the surface, by the size along it
+    dorsal_growth: float = 1.9  # outside the contact, towards the tip
+    aspect: float = 1.7  # across the skin at the surface, relative to the size along it
     bulk: float = 1.5  # across the tissue, at most
     at_bone: float = 0.45  # across the tissue at the bone, where fat is sheared most
     from_bone: float = 6.0  # growth from the bone, relative to the tip radius
     at_ending: float = 0.7  # across the tissue at the ending
-    from_ending: float = 3.0  # likewise
+    from_ending: float = 3.0  # growth from the ending, relative to the tip radius
     point_across: float = 0.02  # endings smaller across the skin, relative to the tip radius, count as points
-    point_along: float = 0.1  # likewise along it
+    point_along: float = 0.1  # endings smaller along the skin, relative to the tip radius, count as points
     at_point: float = 0.1  # size of the element around a point
     from_point: float = 0.5  # growth from that element [-]
     growth: float = 0.2  # growth of elements at the surface with the depth below it [-]
     short_overlap: float = 0.56  # half overlaps shorter than this, relative to the tip radius, have smaller elements
-    fold_elements: float = 4.0  # number of elements of that size to each side of a fold
-    from_fold: float = 0.5  # growth from these [-]
-    fold_aspect: float = 2.0 / 3.0  # across the skin at a fold, by the size along it
-    held_distance: float = 0.1  # skin closer to held skin is compressed without bound, relative to the tip radius
+    fold_elements: float = 4.0  # number of elements of the size `FOLD` to each side of a fold
+    from_fold: float = 0.5  # growth from these elements [-]
+    fold_aspect: float = 2.0 / 3.0  # across the skin at a fold, relative to the size along it
+    held_distance: float = 0.1  # relative to the tip radius: skin closer to held skin is compressed without bound
 
 
 _SIZES = ElementSizes()
@@ -154,7 +154,7 @@ _SIZES = ElementSizes()
 class Sizing:
     """Element sizes of a mesh and where they apply."""
 
-    fineness: float | Lines  # elements to a tip radius, or the lines themselves
+    fineness: float | Lines  # elements per tip radius, or the lines themselves
     indentation: float  # skin lower than this may touch [mm]
     shift: bool = False  # move the mesh along the skin by half an element
     margin: float = 1.0  # undeformed skin lower than (1 + margin/4) indentation may touch
@@ -171,9 +171,9 @@ class FingerMesh:
     sizing: Sizing
     lines: Lines  # before elements are halved
     arcs: Array  # (a + 1,) arc positions of the lines between elements [mm]
-    depths: Array  # (b + 1,) depths of the lines between the elements of the skin, outermost last; bone not included
-    fat: int  # number of elements below the dermis: of the fat, and of a meshed bone
-    all_skin: Indices  # (2 a + 1,) nodes of all the skin, whether they may touch or not
+    depths: Array  # (b + 1,) depths of the lines between the elements of the skin, outermost last; without the bone
+    fat: int  # number of elements below the dermis, in the fat and in a meshed bone
+    all_skin: Indices  # (2 a + 1,) nodes of the whole skin, including those that may not touch
     away_from_held: NDArray[np.bool_]  # (a,) elements along the skin that are not close to held skin
 
     @property
@@ -183,9 +183,9 @@ class FingerMesh:
 
 
 def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMesh:
-    """Return the mesh of `finger`, without its bone, whose surface is held, or with a meshed bone whose core is held.
+    """Return the mesh of `finger`: without a bone, whose surface is held, or with a meshed bone, whose core is held.
 
-    Nodes of a driven cut, and of a nail plate, are held too. Lines between elements frame the reference ending, since
+    Nodes of a driven cut and of a nail plate are held too. Lines between elements frame the reference ending, because
     averages over whole elements converge faster than over parts. Raises MeshError where the outline cannot be meshed.
     """
     outline = Outline.of(finger)
@@ -224,7 +224,7 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
     return FingerMesh(mesh, outline, sizing, base, arcs, depths, below, number[:, -1].copy(), away_from_held)
 
 
-@lru_cache(maxsize=8)  # a mesh and its nested mesh have the same
+@lru_cache(maxsize=8)  # a mesh and its nested mesh share their lines
 def _lines(outline: Outline, receptor: Receptor, sizing: Sizing) -> Lines:
     """Return the lines of a mesh before its elements are halved."""
     finger, fineness = outline.finger, sizing.fineness
@@ -292,15 +292,15 @@ class _Row:
     place: Array  # (n,)
     number: Array  # (n,) elements before it, fractions included
     ends: tuple[float, ...]
-    least: tuple[int, ...]  # least number of elements between each two of them
-    spare: float  # fraction of an element that is spread over the others
+    least: tuple[int, ...]  # least number of elements between consecutive ends
+    spare: float  # fraction of an element that is spread over the other elements
 
     @staticmethod
     def of(outline: Outline, fine: float, receptor: Receptor, sizing: Sizing, scale: float) -> "_Row":
         """Return the row along the skin: fine in the contact, and coarser with the distance from it.
 
-        Lines always lie where straight edge and arc meet, since an element cannot follow a jump in curvature. They also
-        lie at the ends of the nerve ending and of a nail plate.
+        Lines always lie where straight edge and arc meet, because an element cannot follow a jump in curvature. They
+        also lie at the ends of the nerve ending and of a nail plate.
         """
         low, high = _arcs_below(outline, sizing.indentation)
         away = np.concatenate([[0.0], np.geomspace(1e-9, 1.0, 1000)])
@@ -329,15 +329,15 @@ class _Row:
         return _Row(arc, _cumulative_count(arc, sizes), ends, least, 0.2)
 
     def sizes(self) -> Array:
-        """Return the required number of elements between each two ends, fractions included."""
+        """Return the required number of elements between consecutive ends, fractions included."""
         return np.diff(np.interp(self.ends, self.place, self.number))
 
     def gaps(self) -> tuple[int, ...]:
-        """Return the number of elements between each two ends."""
+        """Return the number of elements between consecutive ends."""
         return tuple(max(low, ceil(n - self.spare)) for low, n in zip(self.least, self.sizes().tolist(), strict=True))
 
     def lines(self, gaps: Sequence[int], *, shift: bool = False) -> Array:
-        """Return the lines for `gaps` elements between each two ends; `shift` moves them half an element."""
+        """Return the lines for `gaps` elements between consecutive ends; `shift` moves them by half an element."""
         out: list[Array] = []
         numbers = np.interp(self.ends, self.place, self.number)
         for (first, last), (start, stop), count in zip(pairwise(numbers), pairwise(self.ends), gaps, strict=True):
@@ -371,7 +371,7 @@ def _layers(finger: Finger, fine: float, size: float, receptor: Receptor, thin: 
         near, far = min(near, max(above, top)), max(far, min(below, bottom))
         sizes = np.minimum(sizes, largest)
     ends = _framed([0.0, finger.epidermis, skin, skin + thick], (near, far), finger)
-    # a single element between epidermis and ending is too stiff in shear, whatever its size
+    # a single element of any size between epidermis and ending is too stiff in shear
     least = [2 if end < near <= next_end and end > 0.0 else 1 for end, next_end in pairwise(ends[:-1])]
     row = _Row(depth, _cumulative_count(depth, sizes), ends, (*least, 2), 0.1)
     gaps = row.gaps()
@@ -392,7 +392,7 @@ def _around_point(place: Array, near: float, far: float, size: float) -> tuple[f
 
 
 def _framed(ends: Sequence[float], frame: Sequence[float], finger: Finger) -> tuple[float, ...]:
-    """Return the `ends` in order, and among them those of the `frame` that leave room for an element before others."""
+    """Return the `ends` in order, with those positions of the `frame` that leave room for an element between them."""
     out = list(ends)
     for place in frame:
         if min(abs(place - end) for end in out) > FINEST * finger.tip_radius:

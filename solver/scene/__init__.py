@@ -41,7 +41,7 @@ class Scene:
     solve: Solve = field(default_factory=Solve)
 
     def __post_init__(self) -> None:
-        """Check the types of tables and combinations of them. Raises SceneError."""
+        """Check the types of the tables, and their combinations. Raises SceneError."""
         for name, table in _TABLES.items():
             if not isinstance(getattr(self, name), table):
                 raise SceneError(name, getattr(self, name), f"it must be a {table.__name__}")
@@ -88,7 +88,7 @@ class Scene:
 
     @property
     def meshed_tissues(self) -> tuple[Material, ...]:
-        """The tissues that have elements: without a rigid bone."""
+        """The tissues with elements: all but a rigid bone."""
         return self.materials.by_region if self.finger.bone == "meshed" else self.materials.by_region[:-1]
 
     @property
@@ -121,16 +121,16 @@ class Scene:
         return replace(self.loading, **forces, force_unit="N/mm")
 
     def frictionless_press(self, depth: float) -> "Scene":
-        """Return the scene of the finger pressed to a `depth` [mm] without friction: meshes depend on nothing else."""
+        """Return the scene of the finger pressed to a `depth` [mm] without friction; meshes depend on it alone."""
         frictionless = replace(self, title="", friction=Friction(0.0), loading=Loading(depth))
         return replace(frictionless, solve=Solve(self.solve.kinematics))
 
     def without_drag(self) -> "Scene":
-        """Return the scene that slides on, in place of a prescribed drag."""
+        """Return the scene with a slide in place of a prescribed drag."""
         return replace(self, loading=replace(self.loading, tangential_force=None))
 
     def earlier_slides(self) -> tuple["Scene", ...]:
-        """Return the settled slides before the last one that go the other way, a scene each."""
+        """Return the scene of a settled slide in each direction before the last one that differs from it."""
         opposite = set(self.loading.directions[:-1]) - {self.loading.direction}
         way: dict[int, Slide] = {1: "+x", -1: "-x"}
         solve = replace(self.solve, course="steady")

@@ -2,7 +2,7 @@
 
 The tables head the bound "x 10^-4 (MPa)". It was computed as the largest tangential force on 1 cm2 of contact. As
 printed, that force would be some millinewtons, below the transducer's resolution. So the power of ten must belong to
-pascals: 0.8033e4 Pa, not 0.8033e-4 MPa. "computed" takes that reading, "as-printed" the other.
+pascals: 0.8033e4 Pa, not 0.8033e-4 MPa. "computed" is this reading, "as-printed" the other.
 """
 
 from dataclasses import dataclass

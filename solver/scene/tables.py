@@ -1,6 +1,6 @@
 """The tables of a scene: finger, materials, friction, loading, receptor, solve; each checks itself when made.
 
-Field names are the keys of a scene file. Lengths in mm, stresses in MPa, angles in degrees. In the finger's own frame X
+Field names are the keys of a scene file. Lengths are in mm, stresses in MPa, angles in degrees. In the finger's frame X
 points distally along the finger axis, -Y is palmar, and the origin is the centre of the tip's arc.
 """
 
@@ -12,17 +12,17 @@ from typing import Any, Literal, cast
 Slide = Literal["+x", "-x", "none"]
 Law = Literal["hooke", "neo-hookean", "ogden"]
 TISSUES = ("epidermis", "dermis", "fat", "bone")  # in the order of the mesh's regions
-STIFFENING = 2.0, 14.0  # exponents of Ogden's law, from the neo-Hookean one; steeper laws gave inconsistent results
-SHALLOW = 1e-6  # least indentation [mm]: below, round-off is as large as the response
-MIN_FORCE = 1e-12  # least nonzero friction [-, MPa]: below, round-off is as large as the drag
+STIFFENING = 2.0, 14.0  # exponents of Ogden's law, from the neo-Hookean one; steeper laws give inconsistent results
+SHALLOW = 1e-6  # least indentation [mm]: below it, round-off is as large as the response
+MIN_FORCE = 1e-12  # least nonzero friction [-, MPa]: below it, round-off is as large as the drag
 LAWS_OF = {"small": ("hooke",), "finite": ("neo-hookean", "ogden")}  # of each kinematics
 
 
 class SceneError(ValueError):
-    """A scene that cannot be run: the key, its value, and what is allowed."""
+    """A scene that cannot be run: the key, its value, and the allowed values."""
 
     def __init__(self, key: str, value: object, allowed: str) -> None:
-        """Name the dotted `key`, its `value`, and what is `allowed`."""
+        """Store the dotted `key`, its `value`, and a phrase for the `allowed` values."""
         super().__init__(key, value, allowed)  # all three, so that the error can be sent between processes
         self.key = key
         self.value = value
@@ -35,7 +35,7 @@ class SceneError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table of a scene. NumPy's numbers become Python's, of full width; lists and arrays become tuples."""
+    """A table of a scene. NumPy's numbers become Python's; lists and arrays become tuples."""
 
     def __post_init__(self) -> None:
         """Convert the values."""
@@ -49,7 +49,7 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 - of any type
 
 
 def _row(value: object) -> tuple[object, ...]:
-    """Return a `value` that is a tuple, and nothing of another."""
+    """Return `value` if it is a tuple, else an empty tuple."""
     return cast("tuple[object, ...]", value) if isinstance(value, tuple) else ()
 
 
@@ -144,9 +144,9 @@ class Finger(Table):
         return math.hypot(x - self.bone_centre[0], y - self.bone_centre[1]) - self.bone_radius
 
     def bone_depth(self) -> float:
-        """Return how deep the surface is when it meets the bone, along its normal [mm].
+        """Return the indentation at which the surface meets the bone [mm].
 
-        This is less than the pulp's thickness where the bone does not lie right above the point of first touch.
+        It is less than the pulp's thickness where the bone does not lie right above the point of first touch.
 
         >>> round(Finger().bone_depth(), 3), round(Finger(bone_centre=(-6.0, 0.75), contact_angle=10.0).bone_depth(), 3)
         (4.737, 5.28)
@@ -171,7 +171,7 @@ class Material(Table):
     E: float  # instantaneous Young's modulus of the undeformed tissue [MPa]
     nu: float  # instantaneous Poisson's ratio [-]
     law: Law | None = None  # None: Hooke at small strain, neo-Hookean at finite strain
-    stiffening: float | None = None  # exponent of Ogden's law [-]; None: that of human skin
+    stiffening: float | None = None  # exponent of Ogden's law [-]; None: the exponent of human skin
     prony: tuple[Relaxation, ...] = ()  # of the shear modulus; the bulk modulus does not relax
 
     def check(self, key: str) -> None:
@@ -232,8 +232,8 @@ class Materials:
     def longest_creep(self) -> float:
         """Longest retardation time of any tissue under a constant load [s].
 
-        It is tau / (1 - g) exactly for one term (Zener's solid: Findley, Lai and Onaran 1976, chapter 5). For several
-        terms, the longest tau by the long-term part is an upper bound.
+        It is exactly tau / (1 - g) for one term (Zener's solid: Findley, Lai and Onaran 1976, chapter 5). For several
+        terms, the longest tau divided by the long-term part is an upper bound.
         """
         series = [tissue.prony for tissue in self.by_region if tissue.prony]
         return max((max(t.tau for t in terms) / (1.0 - sum(t.g for t in terms)) for terms in series), default=0.0)
@@ -272,18 +272,18 @@ class Friction(Table):
 
 @dataclass(frozen=True, slots=True)
 class Loading(Table):
-    """How the bone is driven: down within 1 s, by an indentation or a force, then along the surface.
+    """Motion of the bone: down within 1 s, by an indentation or a force, then along the surface.
 
-    A drag can be given in place of a slide to the settled state. It grows within 1 s after the press, and the shift of
-    the bone is part of the solution.
+    A drag can replace the slide to the settled state. It grows within 1 s after the press, and the shift of the bone is
+    part of the solution.
     """
 
     indentation: float | None = None  # [mm]; None for a prescribed normal force
-    slide: Slide | tuple[Literal["+x", "-x"], ...] = "+x"  # "+x": proximal to distal; several: one after the other
+    slide: Slide | tuple[Literal["+x", "-x"], ...] = "+x"  # "+x": proximal to distal; several in sequence
     speed: float = 15.0  # [mm/s]; in an elastic finger it only scales time
     normal_force: float | None = None  # in place of the indentation
     tangential_force: float | None = None  # in place of a slide to the settled state: drag opposing the slide, positive
-    force_unit: Literal["N/mm", "N"] = "N/mm"  # of both forces; "N": of the whole finger, by its width
+    force_unit: Literal["N/mm", "N"] = "N/mm"  # of both forces; "N": on the whole finger, to be divided by its width
 
     def __post_init__(self) -> None:
         """Check ranges, and that exactly one of depth and force is prescribed. Raises SceneError."""
@@ -350,22 +350,22 @@ class Receptor(Table):
             raise SceneError("receptor.ending", self.ending, "it must be two lengths between 0.001 and 20 mm")
 
 
-USUAL_TOLERANCE = 0.003  # a tenth of the range of SED of the published slippery surfaces, the least of any series [-]
+USUAL_TOLERANCE = 0.003  # a tenth of the SED's range over the published slippery surfaces, the smaller of both [-]
 
 
 @dataclass(frozen=True, slots=True)
 class Solve(Table):
     """How to solve the scene.
 
-    Evidence: "quick" comes with the solution, "estimated" also marches the overstress that tissues would still hold,
+    Evidence: "quick" follows from the solution, "estimated" also marches a load path for the residual overstress,
     "measured" solves the scene again in several ways.
     """
 
     kinematics: Literal["small", "finite"] = "small"  # small strain (the paper's), or finite strain
-    course: Literal["steady", "history"] = "steady"  # "steady": the settled state alone; "history": all the way to it
+    course: Literal["steady", "history"] = "steady"  # "steady": the settled state alone; "history": the whole load path
     tolerance: float | None = None  # required relative error of the ending-averaged SED [-]; None: 0.3 %
     evidence: Literal["quick", "estimated", "measured"] = "estimated"  # of the size of omitted effects
-    contrast_tolerance: float | None = None  # required error of differences of SED between surfaces, by their range [-]
+    contrast_tolerance: float | None = None  # required error of SED differences between surfaces, over their range [-]
 
     @property
     def target(self) -> float | None:
