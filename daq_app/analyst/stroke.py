@@ -43,7 +43,7 @@ class RawFile:
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
         self._all_readings: ReadingBlock | None = None  # of a recording without trials
-        self._first_rows: dict[tuple[int, int], int] | None = None  # rows before the block that begins so
+        self._first_rows: dict[tuple[int, int], int] | None = None  # rows before a block, by its beginning
 
     def around(self, stroke: StrokeFinding) -> RawReadings:
         """Return the readings of a stroke's take; in a recording without trials, those around the stroke."""

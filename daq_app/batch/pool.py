@@ -178,7 +178,7 @@ def refuse_unlike(versions: Mapping[str, Any], address: str, worker_name: str) -
 
 
 async def _identity(library: Any, address: str, security: Any) -> str:  # noqa: ANN401 - distributed declares no types
-    """Return the type of server at an address. Raises SchedulerError, where a client would wait forever for silence."""
+    """Return the type of server at an address. Raises SchedulerError if none answers: a client would wait forever."""
     try:
         options = security.get_connection_args("client")
         async with asyncio.timeout(_ANSWERS), library.rpc(address, timeout=_ANSWERS, connection_args=options) as server:
