@@ -45,9 +45,11 @@ def order_of(finger: Finger[Any], state: EquilibriumState) -> float:
     where the cut folds or tissue wrinkles.
     """
     scene = finger.scene
-    squeezed = _check_cut(finger, state) if isinstance(finger, FiniteFinger) and scene.finger.cut == "free" else False
-    if not finger.newton.is_stable(state):
-        raise Folds(WRINKLES)
+    squeezed = False
+    if isinstance(finger, FiniteFinger):
+        squeezed = scene.finger.cut == "free" and _check_cut(finger, state)
+        if not finger.newton.is_stable(state):
+            raise Folds(WRINKLES)
     stiffens = any(tissue.law == "ogden" for tissue in scene.meshed_tissues)
     at_corner = squeezed or stiffens or _stiffness_ratio(scene.materials)[0] > SECOND_ORDER[scene.solve.kinematics]
     return CORNER_ORDER if at_corner else ORDER
