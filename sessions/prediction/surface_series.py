@@ -71,12 +71,20 @@ def other_signs(finger: Scene) -> list[str]:
         return []
     changes = {name: (float(slopes[name][0].change[_SED]), float(base_slopes[name][0].change[_SED])) for name in SERIES}
     return [
-        f"On this finger the SED goes the other way with µ than on the published one, over its surfaces of {name}: by "
-        f"{digits(100 * mine, 0, '+')} % and {digits(100 * published, 0, '+')} % of the mean from the least to the "
-        "greatest µ, at the published depth. What the scores say of the model hangs on the finger that is assumed."
+        f"Over the surfaces of {name} the SED {_change(mine)} as µ rises, at the published depth; on the published "
+        f"finger it {_change(published)}. What the scores say of the model depends on the assumed finger."
         for name, (mine, published) in changes.items()
         if mine * published < 0.0
     ]
+
+
+def _change(share: float) -> str:
+    """Return a change relative to the mean in words.
+
+    >>> _change(-0.042)
+    'falls by 4 %'
+    """
+    return f"{'rises' if share > 0.0 else 'falls'} by {digits(100 * abs(share), 0)} %"
 
 
 def _scene(finger: Scene, surface: Surface, press: Press) -> Scene:

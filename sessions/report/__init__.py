@@ -102,6 +102,7 @@ def numbers_alone(
         model="" if prediction is None else model_in_short(prediction.options, analysis.settings.area),
         width=None if prediction is None else prediction.width,
         width_origin="" if prediction is None else prediction.width_origin,
+        area=analysis.settings.area.sentence,
         interval_kind=analysis.bootstrap.kind,
         interval_kinds=dict(analysis.bootstrap.kinds),
         afferent=extras.afferent,

@@ -15,6 +15,7 @@ from sessions.statistics.psychometric import Psychometric
 from sessions.statistics.rivals import Rival
 from sessions.statistics.scores import MeanScore
 from sessions.strokes import Stroke
+from sessions.strokes.stroke import FIXED
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -66,6 +67,11 @@ class Experiment:
     response: str = "sed"  # the quantity at the ending of these relations, one of `solver.quantities`
     # Numbers and choices: trial, judged index, answer; empty where `psychometric` uses them
     other_answers: tuple[tuple[int, str, str], ...] = ()
+
+    @property
+    def score_name(self) -> str:
+        """What a score over subjects is called: that of P01 where P01 alone scored."""
+        return f"score of {next(iter(self.answers))}" if len(self.answers) == 1 else "mean score"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -183,6 +189,7 @@ class Report:
     other_signs: tuple[str, ...] = ()  # series with opposite slopes of the SED on this finger and the published one
     response: str = "sed"  # the quantity at the ending that is compared with scores, one of `solver.quantities`
     model: str = ""  # short description of the model
+    area: str = FIXED.sentence  # law of the contact area for τ max
     interval_kind: str = ""  # description of the intervals in `StrokeFinding.bootstrap`
     interval_kinds: dict[str, str] = field(default_factory=dict[str, str])  # further descriptions, by a number's name
     scene: TextFile | None = None  # named in the commands, where another finger than the session's was used

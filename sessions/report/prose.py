@@ -26,7 +26,7 @@ from sessions.statistics.correlations import Relation, relation
 from sessions.statistics.scores import by_key
 
 _REACH = 2.0  # of the places considered along the skin, on both sides of the ending [mm]
-OTHER_FINGERS = "On a finger of another size or stiffness the sign may differ; 'daq-app sensitivity' tries 900 of them."
+OTHER_FINGERS = "On a finger of another size or stiffness the sign may differ; 'daq-app sensitivity' tries 896 of them."
 _NumberOf = Callable[[PredictionFinding], float | None]
 
 
@@ -54,8 +54,10 @@ def _in_variant(report: Report, variant: Variant, condition: str) -> str:
 
     tried = {p.experiment for p in report.predictions for a in p.alternatives if a.variant == variant}
     clauses: list[str] = []
+    names: dict[str, None] = {}
     for experiment in report.experiments:
         if experiment.name in tried:
+            names[_scores(experiment)] = None
             fit = _relation(report, experiment, sed)
             text = fit.reason if fit.pearson is None else f"r = {correlation(fit.pearson)}{ends_of(fit)}"
             clauses.append(f"{experiment.name} {text}, n = {plural(fit.n, 'stimulus', 'stimuli')}")
@@ -63,7 +65,11 @@ def _in_variant(report: Report, variant: Variant, condition: str) -> str:
         sizes = [fact.value for fact in report.left_out if condition.endswith(fact.name) and fact.value != NO_ESTIMATE]
         change = f": the change is estimated at {sizes[0]}" if sizes else ""
         return f"{condition}, which was not tried here, the sign of r may differ{change}."
-    return f"{condition}, r of the SED with the mean scores: {'; '.join(clauses)}."
+    return f"{condition}, r of the SED with the {' and the '.join(names)}: {'; '.join(clauses)}."
+
+
+def _scores(experiment: Experiment) -> str:
+    return experiment.score_name.replace("score", "scores", 1)
 
 
 def _relation(report: Report, experiment: Experiment, value: _NumberOf) -> Relation:
@@ -204,4 +210,4 @@ def _prediction_sentence(experiment: Experiment, quantity: ShownResponse, limits
     if fit.pearson is None:
         return f"{sentence}; no correlation with the scores: {fit.reason}."
     r = f"{correlation(fit.pearson)}{ends_of(fit)}"
-    return f"{sentence}; against the mean scores r = {r}, n = {fit.n} stimuli."
+    return f"{sentence}; against the {_scores(experiment)} r = {r}, n = {fit.n} stimuli."

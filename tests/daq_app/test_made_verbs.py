@@ -305,6 +305,10 @@ def test_a_law_of_the_contact_area_is_recorded_and_verify_goes_by_it(small, caps
     for stroke, fixed_stroke in zip(document["strokes"], strokes, strict=True):
         assert stroke["tau_max"] * stroke["contact_area"] <= fixed_stroke["tau_max"] * 100.0 * (1 + 1e-9)
         assert stroke["contact_area"] > 100.0  # every stroke of the simulated subject presses harder than 1 N
+    assert run(["analyse", str(small)]) == 0
+    printed = capsys.readouterr().out
+    assert "tangential force over the contact area: grows as N^0.667 (Hertz" in printed
+    assert "at 1 N, set;" in printed
     assert run(["verify", str(small)]) == 0
 
 

@@ -12,6 +12,8 @@ from daq_app.batch import pool, sign_map
 from daq_app.batch.sensitivity import TooFewAnswers, saltelli_points
 from daq_app.child_process import process_pool
 from daq_app.cli.main import run
+from daq_app.cli.verbs import sensitivity
+from sessions.report.prose import OTHER_FINGERS
 
 
 def answer(sticky, slippery):
@@ -26,6 +28,11 @@ def test_signs_are_kept_where_both_series_have_the_published_one_and_unknown_wit
     assert np.isnan(signs[2:]).all()
     assert sign_map.share(signs[:, 0])[0] == 0.5
     assert sign_map.share(signs[2:, 0]) is None
+
+
+def test_reports_say_how_many_fingers_the_usual_design_has():
+    points = saltelli_points(sign_map.DESIGN, sensitivity.OF_FINGERS, 0)
+    assert f"tries {len(points)} of them" in OTHER_FINGERS
 
 
 def test_the_slope_of_a_number_that_alone_moves_it_has_an_index_of_one():

@@ -114,6 +114,17 @@ def test_the_question_is_of_the_quantity_that_is_held_against_scores(report):
     assert "Does the pressure that a finger model" in study_prose.question(replace(findings, response="pressure"))
 
 
+def test_the_scores_of_one_subject_are_no_means(report):
+    alone = tuple(replace(e, answers={"P01": next(iter(e.answers.values()))}) for e in report.experiments)
+    of_one = replace(report, experiments=alone)
+    sentences = [sentence for sentence in (*summary(of_one), *doubts(of_one)) if "r = " in sentence]
+    assert [sentence.count("the scores of P01") for sentence in sentences if "paths" not in sentence] == [1, 1, 1]
+    assert not any("mean score" in sentence for sentence in sentences)
+    names = {row[0].text for group in relation_table(of_one).groups for row in group.rows}
+    assert names == {"score of P01", "index"}
+    assert "against the mean scores r = " in " ".join(summary(report))
+
+
 def test_where_nobody_gave_a_score_no_word_is_of_scores_or_of_r(report):
     experiments = tuple(
         replace(e, scale_ends=("", ""), scores=(), score_relation=None, answers={}) for e in report.experiments
@@ -164,13 +175,15 @@ def test_a_depth_without_an_interval_says_whether_its_mesh_is_rough_or_no_interv
         assert table.groups[0].rows[0][-1].note.startswith(f"no interval: {why}")
 
 
-def test_every_number_of_a_variant_whose_interval_was_not_asked_for_says_so(report):
+def test_a_table_whose_intervals_were_not_asked_for_says_so_once(report):
     unasked = tuple(
         replace(p, alternatives=tuple(replace(a, interval=None) for a in p.alternatives)) for p in report.predictions
     )
     for table in (of_predictions.variants_table, of_predictions.variant_forces_table):
-        rows = table(replace(report, predictions=unasked)).groups[0].rows
-        assert {cell.note for row in rows for cell in row[2:]} == {"no interval: none was asked for (--intervals)"}
+        whole = table(replace(report, predictions=unasked))
+        cells = [cell for row in whole.groups[0].rows for cell in row[2:]]
+        assert {(cell.note, cell.mark) for cell in cells} == {("no interval: none was asked for (--intervals)", "")}
+        assert whole.notes.count(("", "No interval: none was asked for (--intervals).")) == 1
 
 
 def test_an_exact_p_below_a_thousandth_is_not_shown_as_zero(report):

@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from sessions.report.contents import Report
-from sessions.report.wording import NONE, between, caption, finer
+from sessions.report.wording import NONE, between, capital, caption, finer
 
 Finding = TypeVar("Finding")
 CAPTION_WORDS = 60  # most words of a caption; the rest becomes a note under the table
 TOO_SHORT = "the stroke has too few readings"  # for an interval
+NOT_ASKED = "none was asked for (--intervals)"  # likewise
+_UNMARKED = f"no interval: {NOT_ASKED}"  # the note of nearly every cell: it stands once below the table
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +98,8 @@ def table(name: str, caption_name: str, columns: str, groups: Iterable[Rows], **
 
     def with_mark(content: Cell | str | int) -> Cell:
         cell = content if isinstance(content, Cell) else Cell(str(content))
-        return replace(cell, mark=marks.setdefault(cell.note, _letters(len(marks)))) if cell.note else cell
+        letter = "" if cell.note in ("", _UNMARKED) else _letters(sum(map(bool, marks.values())))
+        return replace(cell, mark=marks.setdefault(cell.note, letter)) if cell.note else cell
 
     cells = ((name, tuple(tuple(map(with_mark, row)) for row in rows)) for name, rows in groups)
     non_empty = tuple(Group(name, rows) for name, rows in cells if rows)
@@ -104,7 +107,7 @@ def table(name: str, caption_name: str, columns: str, groups: Iterable[Rows], **
         return None
     short_caption, further = _shorten(caption(caption_name, **values))
     headings = (heading.strip().removesuffix("]").partition(" [") for heading in columns.split("|"))
-    notes = (*further, *((mark, note) for note, mark in marks.items()))
+    notes = (*further, *((mark, note if mark else f"{capital(note)}.") for note, mark in marks.items()))
     return Table(name, short_caption, tuple(Column(heading, unit) for heading, _, unit in headings), non_empty, notes)
 
 

@@ -8,6 +8,7 @@ from sessions.prediction import SED
 from sessions.prediction.stored import Alternative, Ends, SedInterval, Variant
 from sessions.report.contents import PredictionFinding, Report, StrokeFinding
 from sessions.report.tables import (
+    NOT_ASKED,
     TOO_SHORT,
     Cell,
     Format,
@@ -98,7 +99,7 @@ def _stroke_sed(p: PredictionFinding) -> Cell:
 def _limits(interval: SedInterval | None) -> tuple[Ends | None, str | None]:
     """Return the limits of an interval, and the reason if it has none."""
     if interval is None:
-        return None, "none was asked for (--intervals)"
+        return None, NOT_ASKED
     return bounds(interval.low, interval.high), interval.reason or None
 
 

@@ -76,7 +76,7 @@ def stroke_table(report: Report) -> Table | None:
         )
 
     interval_note = f" Under each number: {report.interval_kind}." if report.interval_kind else ""
-    return _table(report, "table-strokes", "session-strokes", columns, row, kind=interval_note)
+    return _table(report, "table-strokes", "session-strokes", columns, row, kind=interval_note, area=report.area)
 
 
 def course_table(report: Report) -> Table | None:
@@ -202,7 +202,7 @@ def relation_table(report: Report) -> Table | None:
     quantity = shown_response(report.response)
     groups: list[Rows] = []
     for e in report.experiments:
-        relations = {"mean score": e.score_relation, "own score": e.own_relation, "index": e.index_relation}
+        relations = {e.score_name: e.score_relation, "own score": e.own_relation, "index": e.index_relation}
         groups.append((e.name, [_relation_row(name, r) for name, r in relations.items() if r is not None]))
     columns = (
         f"{quantity.label} against | stimuli | Pearson's r | 95 % interval | Spearman's rho | rho's 95 % interval | "
