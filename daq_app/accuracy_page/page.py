@@ -11,8 +11,9 @@ from typing import TypeVar
 
 from daq_app.accuracy_page.figures import plates
 from daq_app.wording import number
+from sessions.file_access import check_replaceable
 from sessions.report.figures.style import Plate
-from sessions.report.pages import embed, swap_in, template
+from sessions.report.pages import embed, make_place, swap_in, template
 from solver.prediction import percent
 from solver.verification.costs import Cost
 from solver.verification.estimates import GOALS, Estimate
@@ -268,6 +269,7 @@ def filled_pages(docs: Path, tables: Mapping[str, Table]) -> dict[Path, str]:
     return texts
 
 
+_DATA_MARK = ' "begun": "'  # how the second line of our data begins
 PAGE, DATA, FIGURES = "accuracy.html", "accuracy.json", "figures"
 # anchor, words, and the names of the figures and tables below them
 SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
@@ -300,16 +302,22 @@ def page(results: RunResults, figures: Mapping[str, Plate] | None = None) -> str
     )
 
 
+def check_folder(folder: Path) -> None:
+    """Raise ReportError where a folder cannot be written into, NotOurs where `write` would replace others' files."""
+    make_place(folder)
+    check_replaceable(folder / DATA, _DATA_MARK, folder / PAGE, folder / FIGURES)
+
+
 def write(results: RunResults, folder: Path) -> tuple[Path, ...]:
     """Write page, pictures and data to `folder`; return the files. Raises ReportError if that fails."""
     data = folder / DATA
-    figures = plates(results)
-    swap_in(folder / PAGE, page(results, figures))  # first: it shows that the others are ours
     swap_in(data, json.dumps(results.to_dict(), indent=1, allow_nan=False) + "\n")
     paths = [data]
+    figures = plates(results)
     for plate in figures.values():
         for panel in plate.panels:
             path = folder / FIGURES / f"{panel.name}.svg"
             swap_in(path, panel.svg)
             paths.append(path)
+    swap_in(folder / PAGE, page(results, figures))
     return (folder / PAGE, *paths)

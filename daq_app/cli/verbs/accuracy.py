@@ -29,11 +29,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    from daq_app.accuracy_page.page import DATA, FIGURES, PAGE, tables, write
-    from sessions.report.pages import check_place
+    from daq_app.accuracy_page.page import PAGE, check_folder, tables, write
 
     console.progress(0.0, "loading")
-    check_place(options.out / PAGE, options.out / DATA, options.out / FIGURES)  # fails before three minutes are spent
+    check_folder(options.out)  # fails before three minutes are spent
     _docs(options, {})
     results = _measure_or_restore(options, console)
     if results.stopped:
