@@ -118,6 +118,7 @@ class SteadySettings:
     steady_seed: float = 0.5  # share of the slide with the least variance of T/N, from which the window is widened [-]
     steady_spread: float = 0.10  # largest standard deviation of T/N relative to its mean [-]
     steady_trend: float = 0.05  # largest difference of a quarter's mean from the whole window's [-]
+    steady_scatter: float = 2.0  # scatter of T/N that such a difference may have beyond it [standard deviations]
     steady_share: float = 0.25  # shortest steady window relative to the stroke [-]
     steady_shortest: float = 0.05  # shortest steady window in time [s]
     steady_readings: int = 5  # shortest steady window in readings

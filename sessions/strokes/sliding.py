@@ -41,7 +41,7 @@ def steady_window(ratio: Array, rate: float, readings: int, settings: AnalysisSe
         return slice(int(starts[best]), int(stops[best]))
     wider = np.flatnonzero(steady & (starts <= starts[best]) & (stops >= stops[best]))
     best = wider[np.lexsort((variance[wider], -length[wider]))[0]]
-    return _trim(ratio, slice(int(starts[best]), int(stops[best])), settings)
+    return _trim(ratio, slice(int(starts[best]), int(stops[best])), rule)
 
 
 def _stretches(ratio: Array, shortest: float, rule: SteadySettings) -> tuple[Indices, Indices, Array, Mask]:
@@ -57,7 +57,7 @@ def _stretches(ratio: Array, shortest: float, rule: SteadySettings) -> tuple[Ind
     mean = (total[stops] - total[starts]) / valid
     variance = np.maximum((squares[stops] - squares[starts]) / valid - mean**2, 0.0)
     scatter = np.where(valid < _QUARTERS * rule.steady_readings, np.sqrt(_QUARTERS * variance / valid), 0.0)
-    tolerance = rule.steady_trend * mean + 2.0 * scatter
+    tolerance = rule.steady_trend * mean + rule.steady_scatter * scatter
     quarters = starts + (stops - starts) * np.arange(_QUARTERS + 1)[:, None] // _QUARTERS
     means = np.diff(total[quarters], axis=0) / np.maximum(np.diff(count[quarters], axis=0), 1.0)
     steady = (np.sqrt(variance) < rule.steady_spread * mean) & (np.abs(means - mean) <= tolerance).all(axis=0)
@@ -75,12 +75,12 @@ def _least_varying(length: Indices, variance: Array, steady: Mask, shortest: flo
     return int(candidates[np.argmin(variance[candidates])])
 
 
-def _trim(ratio: Array, window: slice, settings: AnalysisSettings) -> slice:
+def _trim(ratio: Array, window: slice, rule: SteadySettings) -> slice:
     """Return the window without ends that lie off its median: a quarter's mean hides the end of a ramp."""
     ratios = ratio[window]
     level = float(np.nanmedian(ratios))
     scatter = 1.4826 * float(np.nanmedian(np.abs(ratios - level)))
-    inside = np.flatnonzero(np.abs(ratios - level) <= max(settings.steady.steady_trend * level, 2.0 * scatter))
+    inside = np.flatnonzero(np.abs(ratios - level) <= max(rule.steady_trend * level, rule.steady_scatter * scatter))
     return slice(window.start + int(inside[0]), window.start + int(inside[-1]) + 1)
 
 

@@ -240,6 +240,14 @@ def test_the_steady_window_leaves_ramps_out():
     assert ratio[window].mean() == pytest.approx(0.5, rel=0.005)
 
 
+@pytest.mark.parametrize(("scatter", "stop"), [(1.5, 599), (2.0, 600)])
+def test_the_steady_window_ends_where_the_ratio_lies_within_so_many_deviations_of_its_median(scatter, stop):
+    # Spread evenly over ±0.08: the median deviation is 0.04, and by the normal law the standard deviation 0.0593.
+    ratio = 0.5 + np.random.default_rng(6).permutation(np.linspace(-0.08, 0.08, 600))
+    ratio[0], ratio[-1] = 0.5, 0.6
+    assert steady_window(ratio, 200.0, 600, steadily(steady_scatter=scatter)) == slice(0, stop)
+
+
 def test_a_ratio_that_never_settles_has_no_steady_window():
     t = times(3.0)
     assert steady_window(0.3 + 0.2 * np.sin(2 * np.pi * 1.1 * t), 200.0, len(t), SETTINGS) is None
