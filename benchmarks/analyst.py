@@ -30,7 +30,7 @@ def main() -> None:
 
 
 def _work(folder: Path) -> None:
-    """Print the processor time of each thing that is asked for."""
+    """Print the processor time of each request."""
     start = time.process_time()
     from daq_app.analyst import state as m
     from daq_app.analyst.work import Work
@@ -72,7 +72,7 @@ def _work(folder: Path) -> None:
 
 
 def _painting(film) -> None:  # noqa: ANN001
-    """Print what painting a state of the finger takes."""
+    """Print the time of painting a state of the finger."""
     from PySide6.QtWidgets import QApplication
     from shiboken6 import delete
 
@@ -98,7 +98,7 @@ def _painting(film) -> None:  # noqa: ANN001
 
 
 def _stops(folder: Path) -> None:
-    """Print how long a stop takes to be answered, while the model answers."""
+    """Print the time from a stop to its answer while the model is at work."""
     from daq_app.analyst import state as m
     from daq_app.analyst.process import Analyst
 

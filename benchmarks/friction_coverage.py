@@ -31,8 +31,8 @@ Truth = dict[str, float]
 RATE = 200.0  # [Hz]
 ACCURACY = 0.01  # standard deviation of gains and of cross-talk [-]
 LEAN = 1.0  # standard deviation of the face's lean about each axis [degrees]
-PUSH = 0.01  # standard deviation of a press's own push sideways, by N [-]
-FINE = 20000  # instants at which the true greatest force is sought, and the true mean formed
+PUSH = 0.01  # standard deviation of a press's lateral force, relative to N [-]
+FINE = 20000  # instants for the true largest force and the true mean
 HEIGHT = BenchSettings().height
 CALIBRATION = Calibration("FT0001", "counts", np.diag([1e-6] * 3 + [1e-3] * 3), np.array(RATED), "the bench's own")
 INFO = TransducerInfo("sim:", "net-ft", "SIMULATED", "FT0001", True, RATE, 7000.0, CALIBRATION, {})
@@ -41,18 +41,18 @@ NUMBERS = ("mu_dynamic", "tau_max", "speed")
 
 @dataclass(frozen=True)
 class Trouble:
-    """What a set does to its benches and strokes."""
+    """Disturbances of the benches and strokes of a set."""
 
     bench: BenchSettings = field(default_factory=BenchSettings)
     hum: float = 0.0  # amplitude at 50 Hz on each force [N]
     flicker: float = 0.0  # standard deviation of 1/f noise of each force [N]
     wander: float = 0.0  # standard deviation of mu's slow wandering [-]
-    law: float = 0.0  # mu follows N by this power [-]
-    cross_talk: float | None = None  # error of each force by each other one, of either sign; None: drawn [-]
-    tilt: tuple[float, float] | None = None  # [degrees]; None: drawn
-    presses: int = 0  # before the strokes, by which the analysis measures the lean
-    level: bool = False  # mu's truth is the level that it wanders about, not its mean over this very stroke
-    slips: bool = False  # T/N climbs and drops again and again while the finger slides
+    law: float = 0.0  # exponent of mu as a power of N [-]
+    cross_talk: float | None = None  # cross-talk between any two forces, of either sign; None: random [-]
+    tilt: tuple[float, float] | None = None  # [degrees]; None: random
+    presses: int = 0  # before the strokes, from which the analysis measures the tilt
+    level: bool = False  # the true mu is the level about which it wanders, not its mean over the stroke
+    slips: bool = False  # stick-slip: T/N repeatedly rises and drops while the finger slides
 
 
 SETS = {
@@ -72,10 +72,10 @@ SETS = {
 
 
 class Visit:
-    """Ten strokes of one simulated subject on one bench that errs."""
+    """Ten strokes of one simulated subject on one bench with errors."""
 
     def __init__(self, seed: int, trouble: Trouble) -> None:
-        """Draw how the bench errs and how friction changes along each stroke."""
+        """Draw the errors of the bench and the changes of friction along each stroke."""
         self._trouble, self._seed = trouble, seed
         draw = np.random.default_rng([seed, 77])
         self._bench, self._subject = Bench(seed, trouble.bench), SimulatedSubject(seed)
@@ -94,7 +94,7 @@ class Visit:
         self._drop = draw.uniform(0.1, 0.3)  # of mu in each slip [-]
 
     def strokes(self) -> tuple[Analysis, list[Truth], list[Array]]:
-        """Return the analysis of the ten strokes, the truth of each, and its true force (3,) half-way [N]."""
+        """Return the analysis of the ten strokes, the truth of each, and its true force (3,) at mid-stroke [N]."""
         recordings: list[tuple[Trial, ReadingBlock]] = []
         truths: list[Truth] = []
         forces: list[Array] = []
@@ -119,7 +119,7 @@ class Visit:
         return analyse_blocks(recordings, TrialContext(plan, INFO, AnalysisSettings())), truths, forces
 
     def errors_alone(self, force: Array, settings: BootstrapSettings) -> dict[str, bool]:
-        """Say whether intervals of nothing but gains, cross-talk and lean hold mu and T of a true force (3,) [N]."""
+        """Return whether intervals from gains, cross-talk and tilt alone contain mu and T of a true force (3,) [N]."""
         reading = self._errors[:3, :3] @ self._turn @ force
         systematic = SystematicDraws(settings)
         along = drag_direction(reading[None, :2])
@@ -144,14 +144,14 @@ class Visit:
         return {"mu_dynamic": mu, "tau_max": float(tangential.max()) / CONTACT_AREA, "speed": stroke.speed}
 
     def _factor(self, time: Array, stroke: StrokeGroundTruth) -> Array:
-        """Return friction over the surface's own (n,) [-] at `time` (n,) [s]."""
+        """Return the ratio of mu to the surface's nominal mu (n,) [-] at `time` (n,) [s]."""
         factor = np.ones_like(time)
         if self._trouble.wander:
             waves = np.sin(2 * np.pi * np.outer([0.4, 0.9, 1.7], time) + self._phases[:3, None])
             factor += self._trouble.wander * np.sqrt(2.0 / 3.0) * waves.sum(axis=0)
         if self._trouble.slips:
             phase = np.maximum(time - stroke.slip, 0.0) * self._slips_each % 1.0
-            # A climb over nine tenths of the time, a drop in the last: 7 to 20 ms, as fingers' relaxation allows.
+            # A rise over nine tenths of the period, then a drop of 7 to 20 ms, as fingers' relaxation allows.
             sawtooth = np.where(phase < 0.9, phase / 0.9, (1.0 - phase) / 0.1)
             factor *= np.where(time > stroke.slip, 1.0 - self._drop * (1.0 - sawtooth), 1.0)
         if self._trouble.law:
@@ -170,13 +170,13 @@ class Visit:
         return plain + np.hstack([extra, np.zeros((len(time), 1)), torques])
 
     def _press(self, time: Array) -> Array:
-        """Return the true wrench (n, 6) of a press of 2 N for 1.5 s, by a hand that pushes sideways a little itself."""
+        """Return the true wrench (n, 6) of a press of 2 N for 1.5 s, with a small random lateral force."""
         normal = 2.0 * np.clip(np.minimum(time - 0.5, 2.1 - time) / 0.1, 0.0, 1.0)
         x, y = PUSH * self._hand.standard_normal((2, 1)) * normal
         return np.column_stack([x, y, -normal, -HEIGHT * y, HEIGHT * x, np.zeros_like(time)])
 
     def _measured_wrench(self, time: Array, true: Array) -> Array:
-        """Return the wrench (n, 6) [N, N mm] that the transducer measures of a true one in the face's frame."""
+        """Return the wrench (n, 6) [N, N mm] that the transducer measures for a true wrench in the face's frame."""
         wrench = np.hstack([true[:, :3] @ self._turn.T, true[:, 3:] @ self._turn.T])
         reading = wrench @ self._errors.T + self._bench.wrench(time) - self._bench.true_wrench(time)
         if self._trouble.hum:
@@ -194,7 +194,7 @@ def _block(time: Array, wrench: Array) -> ReadingBlock:
 
 
 def _flicker(n: int, channels: int, seed: Sequence[int]) -> Array:
-    """Return noise (n, channels) whose power falls as 1/f, of standard deviation 1."""
+    """Return 1/f noise (n, channels) with a standard deviation of 1."""
     spectrum = np.fft.rfft(np.random.default_rng(seed).standard_normal((n, channels)), axis=0)
     spectrum[1:] /= np.sqrt(np.arange(1, len(spectrum)))[:, None]
     spectrum[0] = 0.0
@@ -203,9 +203,9 @@ def _flicker(n: int, channels: int, seed: Sequence[int]) -> Array:
 
 
 def row(name: str, seeds: Sequence[int]) -> str:
-    """Return how often intervals of a set hold the truth, over ten strokes of each seed, as a row of a table."""
+    """Return the coverage of a set's intervals over ten strokes of each seed, as a row of a table."""
     hits: dict[str, list[bool | None]] = defaultdict(list)  # None: no interval
-    alone: dict[str, list[bool]] = defaultdict(list)  # by intervals of the errors in common alone
+    alone: dict[str, list[bool]] = defaultdict(list)  # with intervals from the common errors alone
     peaks: list[bool] = []
     for seed in seeds:
         visit = Visit(seed, SETS[name])
@@ -231,7 +231,7 @@ def row(name: str, seeds: Sequence[int]) -> str:
 
 
 def main() -> None:
-    """Print a row for each set, as the documentation holds them."""
+    """Print a row for each set, for the documentation."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", nargs="?", type=int, default=100, help="sessions of each set")
     parser.add_argument("first", nargs="?", type=int, default=5000, help="seed of the first")

@@ -13,7 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-RATE, FRAMES = 200, 60  # readings and looks at the model a second
+RATE, FRAMES = 200, 60  # readings, and polls of the model, per second
 MU, NORMAL = 0.6, 2.0
 
 
@@ -32,7 +32,7 @@ def main() -> None:
 
 
 def _forces(seconds: float, rate: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return time and wrench of a press that breathes, and slides towards +x from half a second on."""
+    """Return time and wrench of a press with a slowly varying force, which slides towards +x from 0.6 s on."""
     time_s = np.arange(int(seconds * rate)) / rate
     normal = NORMAL * np.minimum(time_s / 0.3, 1.0) * (1.0 + 0.2 * np.sin(7.0 * time_s))
     wrench = np.zeros((len(time_s), 6))

@@ -57,7 +57,7 @@ def main() -> None:
 
 
 def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) -> str:
-    """Measure one rate [Hz] for `seconds` real seconds, asking every `every` seconds."""
+    """Measure one rate [Hz] for `seconds` real seconds, reading every `every` seconds; return the row."""
     factor = max(1.0, rate / TOP)
     context = multiprocessing.get_context("spawn")
     box_pipe, far_end = context.Pipe()
@@ -115,7 +115,7 @@ def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) 
 
 
 def serve(rate: int, factor: float, pipe: Connection) -> None:
-    """Be the box's process: serve until asked to end. First send its address and when its time began [s]."""
+    """Run the box's process until it receives a message. First send its address and the instant of its time zero."""
     box = NetFtBox(Bench(1), clock_at(factor), rate=rate)
     box.start()
     pipe.send((box.uri, time.monotonic() - box.now() / factor))
@@ -124,7 +124,7 @@ def serve(rate: int, factor: float, pipe: Connection) -> None:
 
 
 def send(rate: int, seconds: float, pipe: Connection) -> None:
-    """Be a box that is asked to stream and sends so many seconds of records, `rate` a second, packed before."""
+    """Run a box that, once asked to stream, sends `seconds` of prepacked records at `rate` per second."""
     count = round(rate * seconds)
     records = np.zeros(count, RECORD)
     records["number"] = records["counter"] = np.arange(1, count + 1)
@@ -135,7 +135,7 @@ def send(rate: int, seconds: float, pipe: Connection) -> None:
     _, asker = port.recvfrom(100)
     port.connect(asker)
     start, sent = time.monotonic(), 0
-    with contextlib.suppress(ConnectionError):  # whoever asked has gone
+    with contextlib.suppress(ConnectionError):  # the reader has closed
         while sent < count:
             due = min(round((time.monotonic() - start) * rate), count)
             for i in range(sent, due):
@@ -145,7 +145,7 @@ def send(rate: int, seconds: float, pipe: Connection) -> None:
 
 
 def draw(rate: int, pipe: Connection) -> None:
-    """Be the window's process: draw the last ten seconds of six axes at each hand-over; at the end tell how often."""
+    """Run the window's process: draw ten seconds of six axes at each hand-over; finally send the number of frames."""
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     from PySide6.QtWidgets import QApplication
 

@@ -35,7 +35,7 @@ from simulators.net_ft_box import NetFtBox
 RATE = 7000
 PLAN = plan(protocol("sensotact-friction"), "S01", 1)
 STOPS = 5
-BLOCK = 140  # readings handed over at once: 20 ms
+BLOCK = 140  # readings per call: 20 ms
 INFO = TransducerInfo(
     "bench://", "bench", "bench", "0", True, RATE, RATE, Calibration("0", "counts", np.eye(6), np.ones(6), "none")
 )
@@ -61,14 +61,14 @@ def main() -> None:
 
 @contextmanager
 def print_time(task: str) -> Iterator[None]:
-    """Print how long something took, by the clock and by the processor: others may be using the machine."""
+    """Print the elapsed time and the processor time of a block; other work affects only the first."""
     start, cpu = time.perf_counter(), time.process_time()
     yield
     print(f"{task}: {time.perf_counter() - start:.2f} s ({time.process_time() - cpu:.2f} s of processor time)")
 
 
 def memory() -> float:
-    """Return the largest memory so far [MB]."""
+    """Return the peak memory so far [MB]."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
 
 
@@ -126,7 +126,7 @@ def measure_writer(folder: Path, seconds: int) -> None:
 
 
 def measure_process(uri: str, rate: int, seconds: int, room: Path) -> None:
-    """Run sessions at one rate, and print what they cost."""
+    """Run sessions at one rate, and print their cost."""
     start = time.perf_counter()
     with Recorder.start() as recorder:
         recorder.send(m.Connect(uri))
@@ -146,7 +146,7 @@ def measure_process(uri: str, rate: int, seconds: int, room: Path) -> None:
 
 
 def listen(recorder: Recorder, seconds: int) -> None:
-    """Take what a session shows, and print how old and how much it is."""
+    """Receive the live reports of a session, and print their age and amount."""
     ages: list[float] = []
     lags: list[float] = []
     readings = left_out = 0
@@ -170,7 +170,7 @@ def listen(recorder: Recorder, seconds: int) -> None:
 
 
 def until(recorder: Recorder, report_type: type[m.Report]) -> None:
-    """Wait for a report of a kind. Raises RuntimeError where what was asked for could not be done."""
+    """Wait for a report of a kind. Raises RuntimeError where the request failed."""
     while True:
         for report in recorder.poll(0.01):
             if isinstance(report, report_type):

@@ -15,10 +15,10 @@ from solver.scene.published import STICKINESS
 
 TRUE_QUANTITIES = ("mu", "tau_max", "sed", "shear_along_skin", "stretch_along_skin", "pressure")
 DECISIVE_WEIGHT = 0.95  # Akaike weight, as a posterior probability under equal priors
-EFFECTS = AssumedEffects(25.0 * 12.0**0.5, noise=4.0, level_sd=3.0, slope_sd=0.0)  # 25 points a standard deviation
-POOL = 60  # simulated people whose strokes are predicted once; each study draws from them
+EFFECTS = AssumedEffects(25.0 * 12.0**0.5, noise=4.0, level_sd=3.0, slope_sd=0.0)  # 25 points per standard deviation
+POOL = 60  # simulated people whose strokes are predicted once; each study samples from them
 SPEEDS = (20.0, 16.0, 24.0, 18.0, 22.0, 15.0, 25.0, 19.0, 17.0, 23.0, 21.0, 16.5)  # [mm/s]
-WIDE_FORCES = (2.0, 4.5, 3.0, 6.5, 2.5, 5.0, 3.5, 6.0, 2.2, 4.0, 5.5, 3.2)  # in no order of friction [N]
+WIDE_FORCES = (2.0, 4.5, 3.0, 6.5, 2.5, 5.0, 3.5, 6.0, 2.2, 4.0, 5.5, 3.2)  # not in the order of friction [N]
 
 
 PAPER = StudyDesign(
@@ -27,7 +27,7 @@ PAPER = StudyDesign(
     tuple(surface.speed for surface in STICKINESS),
 )
 WIDE = StudyDesign(tuple(np.linspace(0.2, 0.7, 12).round(3).tolist()), WIDE_FORCES, SPEEDS)
-# Eight surfaces at three depths: depth moves the parts of the strain by other shares than friction does.
+# Eight surfaces at three depths: depth and friction change the components of strain in different proportions.
 CROSSED = StudyDesign(
     tuple(np.linspace(0.1, 0.7, 8).round(3).tolist()),
     tuple(np.repeat((1.6, 2.8, 4.2), 8).tolist()),
@@ -38,7 +38,7 @@ STUDIES = (("10 × 5", 10, PAPER), ("20 × 12", 20, WIDE), ("24 × 8 × 3", 24, 
 
 
 def row(study: str, quantity: str, alike: set[str], weights: Sequence[Mapping[str, float]]) -> str:
-    """Return a row of the table: how often the quantity, a twin of it, and a wrong one is preferred or decided."""
+    """Return a row of the table: how often the true quantity, a twin or a wrong one is preferred or decided."""
     first = [max(weight, key=weight.__getitem__) for weight in weights]
     sure = [name for name, study_weight in zip(first, weights, strict=True) if study_weight[name] >= DECISIVE_WEIGHT]
     wrong = [name for name in first if name not in alike]

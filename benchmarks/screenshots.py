@@ -38,7 +38,7 @@ FOLDER = "recordings/P07_sensotact-friction_20260301T143005"
 
 
 class PlayedRecorder:
-    """What the window sends is answered by nobody."""
+    """A recorder whose reports are scripted; requests of the window have no effect."""
 
     pid = 0
 
@@ -46,23 +46,23 @@ class PlayedRecorder:
         self._queue: list[m.Report] = []
         self._bench = Bench(3)
         self._last = 0
-        self._health = health()  # as said last
+        self._health = health()  # last report
         self._peak = np.zeros(7)
 
     def play(self, *reports: m.Report) -> None:
-        """Say these at the next poll."""
+        """Send these reports at the next poll."""
         self._queue += reports
         self._health = next((report for report in reports if isinstance(report, m.HealthReport)), self._health)
 
     def stroke(self, trial: int, time: float) -> None:
-        """Have the finger stroke the surface of a trial at an instant [s, device time]."""
+        """Begin the stroke of a trial's surface at an instant [s, device time]."""
         row = PLAN.trials[trial - 1]
         surface = paper_surfaces()[row.stimulus.descriptor, row.stimulus.index]
         self._bench.mount(surface)
         self._bench.begin_stroke(Stroke(surface.peak_normal_force, surface.speed, row.direction), time)
 
     def readings(self, until: float) -> None:
-        """Say every reading up to an instant [s, device time], a tenth of a second a message."""
+        """Send all readings up to an instant [s, device time], a tenth of a second per message."""
         while self._last < until * RATE:
             number = np.arange(self._last, min(self._last + int(RATE / 10), int(until * RATE) + 1))
             time = number / RATE
@@ -78,8 +78,8 @@ class PlayedRecorder:
     def send(self, request: object) -> None:
         """Do nothing."""
 
-    def poll(self, timeout: float = 0.0) -> tuple[m.Report, ...]:  # noqa: ARG002  nothing is waited for
-        """Return what is to be said."""
+    def poll(self, timeout: float = 0.0) -> tuple[m.Report, ...]:  # noqa: ARG002  it does not wait
+        """Return the scripted reports."""
         reports, self._queue = tuple(self._queue), []
         return reports
 
@@ -91,7 +91,7 @@ class PlayedRecorder:
 
 
 def health(**counts: int) -> m.HealthReport:
-    """Return a report of a bench that is well, except for these counts."""
+    """Return a report of a healthy bench, except for these counts."""
     return m.HealthReport(Health(received=123_456, lag_ms=2.0, **counts), 6999.7, (0.0,) * 7, (0.0,) * 7, 0)
 
 
@@ -101,7 +101,7 @@ def log_line(kind: str, trial: int | None = None, **data: object) -> LoggedEvent
 
 
 def status(safe_ns: int) -> Status:
-    """Return a status whose acknowledgement has come so far; commands alone reach the course."""
+    """Return a status with readings acknowledged up to `safe_ns`."""
     return Status("", 1, 10, 1000, 0, 2.0, Acknowledged(1000, 3, safe_ns))
 
 
@@ -127,7 +127,7 @@ LOCALES = ("de_DE", "ja_JP")
 
 
 def main() -> None:
-    """Take pictures in every setting, each in a process of its own: a scaling cannot be changed while Qt runs."""
+    """Take pictures in every setting, each in a separate process, since Qt cannot change its scaling at run time."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--setting", action="append", help="this setting alone, or these: 1366x768-1.5-dark-de_DE")
@@ -180,7 +180,7 @@ def _take(setting: str, folder: Path, session: Path | None) -> None:
 
 
 class _Places:
-    """The window, brought to each of its places."""
+    """The window, taken to each of its places."""
 
     def __init__(self, application, size, theme, path) -> None:  # noqa: ANN001
         from daq_app.qt.start import open_window
@@ -212,7 +212,7 @@ class _Places:
         self.picture("04-mount")
         self.picture("05-subject-instruction", self.subject)
         model = self.window.live._model
-        # The model answers readings: one more at a time, until it is ready.
+        # The model responds to readings, so send one at a time until it is ready.
         self.wait(lambda: model.provisional or self.recorder.readings((self.recorder._last + 1) / RATE))
         self.play(steps.StartTake(1, 1), steps.MeasureZero(), until=4.0)
         self.recorder.stroke(1, 4.0)
@@ -296,27 +296,27 @@ class _Places:
         shutil.rmtree(folder.parent)
 
     def play(self, *reports, until: float) -> None:  # noqa: ANN002
-        """Have reports said, then readings up to an instant."""
+        """Send reports, then readings up to an instant."""
         self.recorder.play(*reports)
         self.recorder.readings(until)
         self.wait(lambda: not any(isinstance(report, m.Live) for report in self.recorder._queue))
 
     def picture(self, name: str, widget=None) -> None:  # noqa: ANN001
-        """Take a picture of the window, or of another widget, once it has painted."""
+        """Save a picture of the window, or of another widget, once it is painted."""
         for _ in range(5):
             self._work()
             time.sleep(0.02)
         (widget or self.window).grab().save(str(self.path(name)))
 
     def wait(self, condition) -> None:  # noqa: ANN001
-        """Let the window work until something holds."""
+        """Let the window work until `condition` is true, for 120 s at most."""
         deadline = time.monotonic() + 120.0
         while not condition() and time.monotonic() < deadline:
             self._work()
             time.sleep(0.002)
 
     def _work(self) -> None:
-        """Let the window work, while the disk acknowledges, as it does all the time."""
+        """Let the window process events; during a recording the disk acknowledges continually."""
         if self.window.bridge.recording:
             self.recorder.play(status(time.monotonic_ns()))
         self.application.processEvents()

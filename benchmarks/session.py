@@ -42,7 +42,7 @@ def _session(room: Path) -> Path:
 
 
 def _print_replay(recording: Recording, room: Path) -> None:
-    """Print how many times faster than real time the session is replayed, the solver left out."""
+    """Print the speed of a replay relative to real time, without the solver."""
     span_s = (recording.events[-1].time_ns - recording.events[0].time_ns) * 1e-9
     replay_s: list[float] = []
     total_s: list[float] = []
@@ -61,7 +61,7 @@ def _print_replay(recording: Recording, room: Path) -> None:
 
 def _print_analysis(recording: Recording) -> None:
     """Print the processor time of the analysis and of the prediction."""
-    analysis = analyse(recording)  # what is loaded once is loaded now
+    analysis = analyse(recording)  # loads modules before the timing
     strokes = analysis.strokes
     options = PredictionOptions(course="steady", intervals=True, variants="small")
     prediction = predict(analysis, recording.plan, options)
@@ -84,7 +84,7 @@ def _print_analysis(recording: Recording) -> None:
 
 
 def _median_time(work: Callable[[], object]) -> float:
-    """Return the median processor time of some work [s]."""
+    """Return the median processor time of `work` [s]."""
     times: list[float] = []
     for _ in range(RUNS):
         start = time.process_time()

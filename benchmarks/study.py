@@ -36,7 +36,7 @@ def _children() -> float:
 
 
 def main(count: int, options: VisitOptions) -> None:
-    """Make the sessions, time them, print."""
+    """Make the sessions, time them, and print the results."""
     with tempfile.TemporaryDirectory() as room:
         base = Path(room)
         synthetic_study(base / "one", 1, Console(as_json=True), subjects=1)

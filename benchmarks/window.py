@@ -18,7 +18,7 @@ from collections.abc import Callable
 import numpy as np
 import psutil
 
-BEAT = 5  # of a timer of the event loop [ms]
+BEAT = 5  # interval of a timer in the event loop [ms]
 FIRST_PAINT = """
 import os, sys, time
 sys.argv = ["daq-app"]
@@ -106,16 +106,16 @@ def _session(options: argparse.Namespace) -> None:
 
 
 class _Observations:
-    """What is noted while the window works: its paints, and the beats of a timer of its event loop."""
+    """Records of the window's paints, and of the beats of a timer in its event loop."""
 
     def __init__(self) -> None:
-        """Watch every plot that is made from now on."""
+        """Watch every plot made from now on."""
         from daq_app.qt.live_plot import LivePlot
 
         self.window = None
         self.paints: list[float] = []  # instants of a painted frame [s]
-        self.late: list[float] = []  # between two beats, beyond what was asked for [s]
-        self.busy: list[float] = []  # processor time between two beats: what is left where nobody else wants it [s]
+        self.late: list[float] = []  # delay of a beat beyond its interval [s]
+        self.busy: list[float] = []  # processor time between two beats: the delay on an idle machine [s]
         self.behind: list[float] = []  # recorder to device [ms]
         self.age: list[float] = []  # from a reading's arrival to the paint that shows it [s]
         self.model_age: list[float] = []  # from a reading's arrival to the paint of the SED it led to [s]
@@ -129,14 +129,14 @@ class _Observations:
         LivePlot.paintEvent = paint_and_note
 
     def begin(self, window: object) -> None:
-        """Begin to count."""
+        """Start counting."""
         for values in (self.paints, self.late, self.busy, self.behind, self.age, self.model_age):
             values.clear()
         self.window, self.predictions = window, window.bridge.model.predictions
         self._last, self._own, self._newest_ns, self._prediction = time.perf_counter(), time.thread_time(), 0, None
 
     def beat(self, window: object) -> None:
-        """Note how late a beat is, and what was worked since the one before."""
+        """Record the delay of a beat, and the processor time since the previous one."""
         now, own = time.perf_counter(), time.thread_time()
         self.late.append(now - self._last - BEAT / 1000)
         self.busy.append(own - self._own)
@@ -144,7 +144,7 @@ class _Observations:
         self._last, self._own = now, own
 
     def _note(self, plot: object) -> None:
-        """Note the paint of a plot: how old the newest reading in it is."""
+        """Record the paint of a plot and the age of its newest reading."""
         if self.window is None:
             return
         bridge, now = self.window.bridge, time.monotonic()
@@ -160,7 +160,7 @@ class _Observations:
             self.model_age.append(now - (1e-9 * self._prediction.received_ns - bridge.session_offset))
 
     def report(self, seconds: float, cpu: dict[str, float]) -> None:
-        """Print what was noted in so many seconds; `cpu` is processor time by process [s]."""
+        """Print the records of `seconds` seconds; `cpu` is processor time by process [s]."""
         count = self.window.bridge.model.predictions - self.predictions
         print(f"  frames: {len(self.paints) / seconds:.0f} a second, {_parts(np.diff(self.paints))} ms apart")
         print(f"  processor of the window: {1000 * cpu['window'] / len(self.paints):.1f} ms a frame, all it does")
@@ -174,7 +174,7 @@ class _Observations:
 
 
 def _processor() -> dict[str, float]:
-    """Return the processor time of the window's process and of those it started [s]."""
+    """Return the processor time of the window's process and of its child processes [s]."""
     seconds = {"window": sum(os.times()[:2])}
     for process in psutil.Process().children():
         with contextlib.suppress(psutil.Error):

@@ -1,1 +1,1 @@
-"""The answer: settled response of a scene, its derivatives, steppers and fields."""
+"""The answer: the settled response of a scene, its derivatives, steppers and fields."""

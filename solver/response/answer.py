@@ -1,4 +1,4 @@
-"""Solutions of scenes, and their predictions: numbers with error estimates, skin, history and omitted effects."""
+"""Solutions of scenes, and their predictions: results with error estimates, skin, history and omitted effects."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -22,8 +22,8 @@ from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Pr
 from solver.progress import Progress
 from solver.scene import Scene
 
-# Elements to a tip radius of the mesh that all others begin at. At finite strain 3 folds the skin of steep slides; 5
-# takes a tenth less time to 1 % and a fifth more to 0.1 %. At small strain 3 and 5 take as long to 1 %.
+# Elements per tip radius of the first mesh. At finite strain, skin folds on a mesh of 3 under steep friction; 5 takes a
+# tenth less time to 1 % and a fifth more to 0.1 %. At small strain 3 and 5 take as long to 1 %.
 FIRST_FINENESS = 4.0
 
 
@@ -36,14 +36,14 @@ class SceneSolution:
     displacement: Array  # (nodes, 2) [mm]
     audits: dict[str, float]
     steps: Steps | None  # where the state depends on its load path
-    path: LoadPath | None  # the load path, where the scene asks for it
+    path: LoadPath | None  # the load path, where the scene requests it
     warnings: tuple[str, ...] = ()  # of its kinematics
     wall_s: float = 0.0
     setup_s: float = 0.0
 
     @property
     def elastic_path(self) -> tuple[Instant, ...] | None:
-        """The load path, where nothing relaxes on it, so that forces alone determine its pictures."""
+        """The load path, where no tissue relaxes, so that forces alone determine its pictures."""
         return None if self.path is None or self.path.tissue is not None else tuple(self.path.instants)
 
 
@@ -55,7 +55,7 @@ def prediction(
     nested: NestedNumbers | NotConverged,
     estimate_s: float,
 ) -> Prediction:
-    """Return the prediction of a state with its `numbers` (COUNT,), and the SED (r,) of the row of receptors [MPa]."""
+    """Return the prediction of a state from its `numbers` (COUNT,) and the SED (r,) of the row of receptors [MPa]."""
     scene, state = solution.scene, solution.state
     sed, normal, tangential, depth, shift, width, point = numbers[:FORCES_AND_PLACES].tolist()
     driven = scene.driven(depth)
@@ -144,14 +144,14 @@ Answer = Prediction | SolveFailure
 Watch = Callable[[int, Answer, LinearFinger, tuple[Instant, ...] | None], None]  # position, answer, finger, load path
 
 
-LoadingGroup = tuple[float, float, str]  # how deep or hard, and which way: `Scene.loading_group`
+LoadingGroup = tuple[float, float, str]  # depth, force and direction: `Scene.loading_group`
 
 
 class Meshing(ABC):
     """Solves scenes of one finger on meshes of any fineness, and keeps meshes for reuse."""
 
     def __init__(self, scenes: Sequence[Scene], depths: Sequence[float], progress: Progress | None) -> None:
-        """Start without meshes, which are made for the `depths` [mm] of `scenes`, estimates where forces are given."""
+        """Start without meshes; these are made for the `depths` [mm] of `scenes`, estimated where forces are given."""
         self.progress = progress
         self.deepest: dict[LoadingGroup, float] = {}  # [mm]
         for scene, depth in zip(scenes, depths, strict=True):
@@ -168,10 +168,10 @@ class Meshing(ABC):
 def complete_audits(
     scene: Scene, finger: Finger[Patches], solution: SceneSolution, newton: Newton, settled_sed: Callable[[], float]
 ) -> None:
-    """Complete the audits of a state and of its load path; raise SolveFailure where they fail.
+    """Complete the audits of a state and of its load path. Raises SolveFailure where they fail.
 
-    `newton` belongs to the body that stores the energy of the load path. `settled_sed` returns the SED of the state
-    that was solved directly, with which a load path must end.
+    `newton` belongs to the body that stores the energy of the load path. `settled_sed` returns the SED of the directly
+    solved state, with which a load path must end.
     """
     checks, state, path = solution.audits, solution.state, solution.path
     audits.refuse_unsound(checks, state.load.depth)
@@ -181,5 +181,5 @@ def complete_audits(
         return
     relaxing = path.tissue is not None
     checks |= audits.course_audits(newton, [instant.state for instant in path.instants], relaxing=relaxing)
-    if not relaxing or state.sticking == 0.0:  # stuck and relaxing, the end depends on the way
+    if not relaxing or state.sticking == 0.0:  # the end of a relaxing path with stuck points depends on the path
         checks["course_against_direct"] = abs(settled_sed() / finger.sed_ending(solution.displacement) - 1.0)

@@ -1,4 +1,4 @@
-"""The deformed finger as a picture: triangles with fields at their corners, outlines, and stills of a course."""
+"""The deformed finger as a picture: triangles with fields at their corners, outlines, and stills of a load path."""
 
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
@@ -25,19 +25,19 @@ from solver.scene import Scene
 # Eight triangles of each element, in its nine nodes
 _AROUND = [0, 4, 1, 5, 2, 6, 3, 7]  # the nodes along the sides of an element
 _SPLIT = np.array([[8, 0, 4], [8, 4, 1], [8, 1, 5], [8, 5, 2], [8, 2, 6], [8, 6, 3], [8, 3, 7], [8, 7, 0]])
-DISPLACEMENT = "displacement"  # its name among the fields: how far a node moved relative to the bone [mm]
-_INSIDE = float(Q2P1.points.max())  # outermost point of quadrature, as a share of the way to the node [-]
+DISPLACEMENT = "displacement"  # name of a field: distance by which a node moved relative to the bone [mm]
+_INSIDE = float(Q2P1.points.max())  # local coordinate of the outermost quadrature point [-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fields:
-    """What is drawn, in the world: the surface is y = 0, the finger above it, pressed and dragged."""
+    """A picture in the world frame: the surface is y = 0, the finger above it is pressed and dragged."""
 
-    nodes: Array  # (n, 2) deformed positions [mm]; a node between layers is there once for each
+    nodes: Array  # (n, 2) deformed positions [mm]; a node between layers appears once for each
     triangles: Indices  # (t, 3)
     values: Mapping[
         str, Array
-    ]  # (n,) each of `FIELDS`, a mean over the elements of one layer at the node; displacement
+    ]  # (n,) each of `FIELDS`, averaged over the elements of one layer at the node; `DISPLACEMENT`
     outlines: Mapping[str, Array]  # "skin", "epidermis", "dermis", "bone": (m, 2) deformed lines [mm]
     patch: Array  # (m, 2) outline of the reference ending, deformed [mm]
 
@@ -49,17 +49,17 @@ class Fields:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sketch:
-    """What all pictures of one finger on one mesh share."""
+    """The data that all pictures of one finger on one mesh share."""
 
     mesh: Mesh
-    triangles: Indices  # (t, 3) of the nodes that are drawn
-    elements: Indices  # (e, 8) of those nodes, along the sides of each element
+    triangles: Indices  # (t, 3) of the nodes of the picture
+    elements: Indices  # (e, 8) of the picture's nodes, along the sides of each element
     region: Indices  # (t,) number of the material of each triangle
     skin: SkinLine
     probes: Probes  # at the nodes of every element, one element after the other
     elastic: Elastic
-    _nodes: Indices  # (n,) node of the mesh behind each node that is drawn
-    _place: Indices  # (e, 9) node that is drawn for each of an element
+    _nodes: Indices  # (n,) node of the mesh for each node of the picture
+    _place: Indices  # (e, 9) node of the picture for each node of an element
     _lines: Mapping[str, tuple[Indices, Array]]  # element (m,) and shape functions (m, 9) of the lines that move
     _bone: Array  # (m, 2) undeformed [mm]
 
@@ -95,12 +95,12 @@ class Sketch:
         )
 
     def values(self, displacement: Array) -> Array:
-        """Return `FIELDS` at the nodes of every element (f, 9 e, m) of displacements (nodes, 2, m), small strain."""
+        """Return `FIELDS` at the nodes of every element (f, 9 e, m) for displacements (nodes, 2, m), small strain."""
         state = self.elastic.state(self.elastic.probe_data(self.probes), displacement)
         return np.stack([field.small(state) for field in FIELDS])
 
     def fields(self, displacement: Array, indentation: float, values: Array) -> Fields:
-        """Return the picture of displacements (nodes, 2) [mm] relative to the bone, with their `values` (f, 9 e)."""
+        """Return the picture of displacements (nodes, 2) [mm] relative to the bone, with `values` (f, 9 e) of them."""
         position = self.mesh.nodes + displacement - [0.0, indentation]
         place = self._place.ravel()
         count = np.bincount(place)
@@ -116,7 +116,7 @@ class Sketch:
 
 
 def fields_of(prediction: Prediction, sketch: Sketch | None = None) -> Fields:
-    """Return the picture of `prediction`; `sketch` is that of its mesh, where it was made before."""
+    """Return the picture of `prediction`; `sketch` is the sketch of its mesh, if it exists."""
     sketch = sketch or Sketch.of(prediction.mesh, prediction.scene)
     return sketch.fields(prediction.displacement, prediction.indentation, _values(prediction, sketch))
 
@@ -139,8 +139,8 @@ def _values(prediction: Prediction, sketch: Sketch) -> Array:
     sound = np.isfinite(fields).all(axis=0)
     if sound.all():
         return fields
-    # In a sharp corner, as where bone ends at the skin, an element's own shape functions may turn its node inside out,
-    # although no point over which the element is integrated is. The nearest such point then stands for the node.
+    # In a sharp corner, such as where bone ends at the skin, det F may be negative at a node of an element although it
+    # is positive at all quadrature points. The nearest of these then represents the node.
     points = np.tile(_INSIDE * Q2P1.positions, (len(sketch.mesh.elements), 1))
     return np.where(sound, fields, values(Probes.at(sketch.mesh, sketch.elastic.centre, sketch.probes.element, points)))
 
@@ -162,7 +162,7 @@ def _locate(mesh: Mesh, points: Array) -> tuple[Indices, Array]:
 
 
 def _elements_at(mesh: Mesh, points: Array) -> Indices:
-    """Return the element (m,) that holds each point, or the one nearest to holding it."""
+    """Return the element (m,) that holds each point, or the element nearest to it in local coordinates."""
     centres = mesh.nodes[mesh.elements[:, 8]]
     near = np.argsort(np.sum((points[:, None] - centres) ** 2, axis=2), axis=1)[:, :12]
     candidates = near.ravel()
@@ -174,7 +174,7 @@ def _elements_at(mesh: Mesh, points: Array) -> Indices:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Still:
-    """One state of the way, at small strain."""
+    """One state of a load path, at small strain."""
 
     instant: Instant
     fields: Fields
@@ -184,7 +184,7 @@ class Still:
 
 
 def stills(finger: LinearFinger, instants: Sequence[Instant], sketch: Sketch) -> tuple[Still, ...]:
-    """Return the pictures of states that `finger` was in; tissues at rest, so for ways on which nothing relaxes."""
+    """Return the pictures of states of `finger`, on load paths along which no tissue relaxes."""
     displacement = finger.body.displacement(np.stack([instant.state.u for instant in instants], axis=2))
     values = sketch.values(displacement)
     rows = finger.row.average(displacement)
@@ -204,9 +204,9 @@ def stills(finger: LinearFinger, instants: Sequence[Instant], sketch: Sketch) ->
 def path_until_failure(
     scene: Scene, finger: LinearFinger, progress: Progress | None = None
 ) -> tuple[tuple[Instant, ...], SolveFailure | None]:
-    """Return the states from first touch on, and why there are no more where they end before the finger settles.
+    """Return the states from first touch on, and the failure if they end before the finger settles.
 
-    They end before tissue folds: states beyond solve the equations of small strain and are none of a finger's. Raises
+    They end before tissue folds: later states solve the equations of small strain, but no finger has them. Raises
     Cancelled where `progress` says so.
     """
     path = undeformed_path(scene, finger)
@@ -218,7 +218,7 @@ def path_until_failure(
 
 
 def _before_folding(finger: LinearFinger, instants: Sequence[Instant]) -> tuple[Instant, ...]:
-    """Return the states before the first in which tissue is turned inside out; what folds stays folded."""
+    """Return the states before the first in which tissue is inside out; folded tissue stays folded."""
 
     def folds(instant: Instant) -> bool:
         return finger.body.smallest_det(finger.displacement(instant.state)) <= 0.0
@@ -227,7 +227,7 @@ def _before_folding(finger: LinearFinger, instants: Sequence[Instant]) -> tuple[
 
 
 def place_of_least_stretch(finger: LinearFinger, state: EquilibriumState, depth: float) -> tuple[float, float]:
-    """Return the place [mm] in the world where tissue is squeezed most: the corner that stretches least."""
+    """Return the position [mm] of most compressed tissue in the world frame: the corner with the least stretch."""
     displacement = finger.displacement(state)
     mesh = finger.geometry.mesh
     corner = int(np.argmin(finger.body.stretches(displacement)[0]))

@@ -1,4 +1,4 @@
-"""Solve scenes at finite strain with error estimates, on finer and finer meshes that start from coarser solutions."""
+"""Solve scenes at finite strain with error estimates, on successively finer meshes from coarser solutions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -36,9 +36,9 @@ from solver.response.answer import (
 )
 from solver.scene import Scene
 
-NEAR_SLIDE = 0.98  # of the friction limit, from which contact is where it is when the finger slides
-CONTACT_MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
-WIDER = 6.0  # the same where contact was met at the end of that skin
+NEAR_SLIDE = 0.98  # ratio of drag to friction limit from which contact lies where it lies in full slip
+CONTACT_MARGIN = 3.0  # height of the undeformed skin up to which contact is considered: `Sizing.margin`
+WIDER = 6.0  # this margin where contact reaches the end of that skin
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,15 +53,15 @@ class MeshSolution:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NestedSolution:
-    """The solutions of one scene on the coarse mesh and on the mesh that counts."""
+    """The solutions of one scene on the coarse mesh and on the mesh of the answer."""
 
     coarse: MeshSolution
     top: MeshSolution
-    steps: Steps | None = None  # those that the course takes, where the state depends on its way
+    steps: Steps | None = None  # of the load path, where the state depends on it
 
 
 class Meshes:
-    """A cache of the meshes of one finger and of coarse solutions, for scenes that are pressed and slide alike."""
+    """A cache of the meshes of one finger and of coarse solutions, for scenes with the same press and slide."""
 
     def __init__(self) -> None:
         """Start empty."""
@@ -82,9 +82,9 @@ class Meshes:
         return self._fingers[sizing]
 
     def coarse(self, scene: Scene, sizing: Sizing) -> MeshSolution:
-        """Return a scene's solution on a coarse mesh, started from the last solution there. Raises SolveFailure.
+        """Return a scene's solution on a coarse mesh, started from the last solution on it. Raises SolveFailure.
 
-        It is the settled state, or the full slip where a given drag is close to the friction limit.
+        It is the settled state, or full slip where a given drag is close to the friction limit.
         """
         is_new = (scene, sizing) not in self._coarse
         if is_new:
@@ -125,7 +125,7 @@ def coarse_solution(scene: Scene, guess: float, fineness: float | Lines, meshes:
         beyond_limit = is_folded(coarse.finger, coarse.state)
     except NoSteadyState:
         if scene.normal_force is not None and not scene.loading.dragged:
-            raise  # decided on a mesh of its own, whatever this one is
+            raise  # the limit comes from a mesh made for it, not from this one
     except NotConverged:
         beyond_limit = True
     except SolveFailure:
@@ -159,12 +159,12 @@ def _on_coarse(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None
     try:
         slide = rough_state(finger, scene.without_drag(), near)
     except SolveFailure:
-        return march_scene(scene, finger).last  # the drag may be met before sliding would fold the skin
+        return march_scene(scene, finger).last  # the drag may be reached before sliding would fold the skin
     return slide if drag >= NEAR_SLIDE * abs(slide.force[0]) else march_scene(scene, finger).last
 
 
 def refine(scene: Scene, fineness: float | Lines, coarse: MeshSolution, meshes: Meshes) -> NestedSolution:
-    """Return the settled state refined from `coarse`, the scene's coarse solution. Raises as `solution_on`."""
+    """Return the settled state, refined from the scene's `coarse` solution. Raises as `solution_on`."""
     steps = choose_steps(scene, coarse.finger, coarse.state)
     sizing = replace(coarse.sizing, fineness=fineness)
     top = solution_on(scene, sizing, coarse, meshes, 1 if steps is None else steps.factor)
@@ -198,7 +198,7 @@ def _starting_solution(scene: Scene, sizing: Sizing, below: MeshSolution, meshes
 def solve_nested(
     scene: Scene, top: MeshSolution, steps: Steps | None, meshes: Meshes
 ) -> tuple[NestedState | NotConverged, Steps | None]:
-    """Return the state of a scene on the nested mesh of `top`, or why it gives no error, and its load steps.
+    """Return the state of a scene on the nested mesh of `top`, or the reason for no estimate, and its load steps.
 
     `steps` are the load steps taken where the state depends on its load path. Raises Cancelled.
     """
@@ -208,7 +208,7 @@ def solve_nested(
     finger = start.finger
     try:
         if top.state.load.path_dependent:
-            if steps is None:  # since it slid on the coarse mesh
+            if steps is None:  # the coarse mesh had full slip
                 choice = choose_steps(scene, top.finger, top.state)
                 steps = None if choice is None else replace(choice, factor=1)
             state = end_of_path(scene, finger)
@@ -231,7 +231,7 @@ FINITE_IMBALANCE = 1e-8  # relative residual of the forces from which a state is
 class FiniteMeshing(Meshing):
     """Finite strain: each scene starts on a coarse mesh and is refined on a mesh made for its contact.
 
-    Scenes that are pressed and move alike share meshes. They are solved by rising friction, each from the one before.
+    Scenes with the same press and slide share meshes. They are solved by rising friction, each from the previous one.
     """
 
     def __init__(self, scenes: Sequence[Scene], depths: Sequence[float], progress: Progress | None) -> None:
@@ -239,8 +239,8 @@ class FiniteMeshing(Meshing):
         super().__init__(scenes, depths, progress)
         self._meshes: dict[LoadingGroup, Meshes] = {}
 
-    def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:  # noqa: ARG002 - of small strain
-        """Do as `Meshing` says."""
+    def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:  # noqa: ARG002 - for small strain
+        """Return the prediction or the failure of each scene on meshes of a `fineness`. Raises as `Meshing`."""
         answers: dict[int, Answer] = {}
         with interruptible(self.progress, lambda: len(answers) / len(scenes)):
             for number in sorted(range(len(scenes)), key=lambda n: solution_order(scenes[n])):
@@ -258,7 +258,7 @@ class FiniteMeshing(Meshing):
 
 
 def solution_order(scene: Scene) -> tuple[LoadingGroup, float]:
-    """Return a key that sorts scenes by how they are pressed, then by friction, so that neighbours are similar."""
+    """Return a key that sorts scenes by their loading, then by friction, so that neighbours are similar."""
     return scene.loading_group, float(scene.friction.mu)
 
 
@@ -277,7 +277,7 @@ def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float)
         raise NotConverged(f"No contact was found at {state.load.depth:g} mm of indentation: ask for more depth.")
     check_depth(scene, state.load.depth)
     newton = finger.newton if path is None else path.newton
-    # Under a light touch, errors of displacements far below a nanometre leave a large part of the forces unbalanced.
+    # Under a light touch, displacement errors far below a nanometre leave a large part of the forces unbalanced.
     checks = _audits(finger, newton, state)
     correct = partial(_correct, finger, newton)
     state, checks = audits.balance(state, checks, FINITE_IMBALANCE, correct)
@@ -298,9 +298,9 @@ def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float)
 def _correct(
     finger: FiniteFinger, newton: Newton, state: EquilibriumState, checks: dict[str, float]
 ) -> tuple[EquilibriumState, dict[str, float]] | None:
-    """Return a state and its audits after one more Newton step, None where its contact then contradicts itself more.
+    """Return a state and its audits after one more Newton step, None where that increases contradictions of contact.
 
-    `newton` is that of the finger, or of its relaxing tissues; `checks` are the audits of `state`.
+    `newton` belongs to the finger, or to its relaxing tissues; `checks` are the audits of `state`.
     """
     x = state.skin_positions(newton.condensed)[:, 0]
     if not newton.linearise(state, state.load, x):

@@ -1,8 +1,8 @@
-"""Slides near a predicted one, on its mesh and from its state, and derivatives by friction and load.
+"""Slides near a predicted one, on its mesh and from its state, and derivatives with respect to friction and load.
 
 A nearby slide costs a few small systems, and most of the mesh error cancels in its difference from the prediction. A
-derivative is one more solve of the last system at fixed contact states, and is exact until a state changes. At a kink,
-where a node is about to change its state, it is one-sided.
+derivative takes one more solve of the last system at fixed contact states, and is exact until a state changes. At a
+kink, where a node is about to change its state, it is one-sided.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -34,7 +34,7 @@ _MU, TAU_MAX, _DEPTH = range(3)
 
 
 class Gradient(NamedTuple):
-    """The derivatives of one number by each parameter."""
+    """The derivatives of one result with respect to each parameter."""
 
     mu: float  # coefficient of friction [-]
     tau_max: float  # traction bound [MPa]; 0 where nothing slips at the bound
@@ -44,19 +44,19 @@ class Gradient(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Derivatives:
-    """The derivatives of the numbers of one settled slide."""
+    """The derivatives of the results of full slip."""
 
     sed: Gradient  # averaged over the ending [MPa]
     normal: Gradient  # force of the surface on the finger along +y [N/mm]
     tangential: Gradient  # drag opposing the slide [N/mm]
     indentation: Gradient  # [mm]
-    responses: Mapping[str, Gradient]  # of every quantity at the ending, by its name
+    responses: Mapping[str, Gradient]  # of every quantity at the ending, by name
 
 
 def slide_derivatives(finger: Finger[Patches], scene: Scene, state: EquilibriumState) -> Derivatives:
-    """Return the derivatives at a settled slide, driven by depth or by force.
+    """Return the derivatives at full slip, under a given depth or force.
 
-    Raises ValueError where points stick, since such a state depends on the way to it, and where it has no tangent.
+    Raises ValueError where points stick, because such a state depends on its load path, and where it has no tangent.
     """
     skin = skin_derivatives(finger.newton, state)
     along, up = finger.newton.force_changes(skin)
@@ -71,15 +71,15 @@ def slide_derivatives(finger: Finger[Patches], scene: Scene, state: EquilibriumS
 
 
 def _derivatives(rows: Sequence[Gradient]) -> Derivatives:
-    """Return the derivatives of every quantity, both forces and the indentation by their names."""
+    """Return the derivatives of every quantity, of both forces and of the indentation."""
     by_name = dict(zip(NAMES, rows, strict=False))
     return Derivatives(by_name[SED.name], *rows[len(NAMES) :], responses=by_name)
 
 
 def skin_derivatives(newton: Newton, state: EquilibriumState) -> Array:
-    """Return the derivatives of a slide's skin (2 k, 3) by mu, tau_max and depth, by Newton's linearised contact.
+    """Return the derivatives (2 k, 3) of a slide's skin with respect to mu, tau_max and depth, at fixed contact states.
 
-    Raises ValueError for a state that is no slide, and where it has no tangent, at a limit.
+    Raises ValueError for a state that is not full slip, and for one without a tangent, at a limit.
     """
     load, size = state.load, len(state.state)
     if load.sense == 0 or (state.state == STICK).any():
@@ -87,7 +87,7 @@ def skin_derivatives(newton: Newton, state: EquilibriumState) -> Array:
     if not newton.linearise(state, load, newton.skin_x):
         raise ValueError("the state has no tangent")
     x = np.ascontiguousarray(state.skin_positions(newton.condensed)[:, 0])
-    position = SkinPosition(x, np.zeros(size), x)  # on the surface, and nowhere else than where it sticks
+    position = SkinPosition(x, np.zeros(size), x)  # on the surface, with sticking nodes at their anchors
     system = newton.system
     bounded_length(x, newton.skin, system.length)
     count = assemble_contact_system(
@@ -106,11 +106,11 @@ def skin_derivatives(newton: Newton, state: EquilibriumState) -> Array:
 
 
 def stiffness_derivatives(finger: LinearFinger, state: EquilibriumState) -> Array:
-    """Return the derivatives d log N / d log E (r,) of a frictionless press's normal force by each tissue's stiffness.
+    """Return d log N / d log E (r,) of the normal force N of a frictionless press, E being each tissue's stiffness.
 
-    Regions stand in the order of the mesh; a rigid bone has 0. With u the displacements, w their derivative by the
-    depth and K the stiffness of one tissue, dN / d log E is w K u: without friction the contact's forces do no work on
-    w but by the depth. The sum is 1, since N is linear in all stiffnesses together. Raises ValueError with friction.
+    Regions are in the order of the mesh; a rigid bone has 0. With displacements u, their derivative w with respect to
+    depth and the stiffness K of one tissue, dN / d log E = w K u: without friction the contact forces work on w only
+    through the depth. The sum is 1, since N is linear in all stiffnesses together. Raises ValueError with friction.
     """
     if state.load.mu != 0.0:
         raise ValueError("with friction the normal force is no derivative of an energy")
@@ -122,9 +122,9 @@ def stiffness_derivatives(finger: LinearFinger, state: EquilibriumState) -> Arra
 
 
 def response_derivatives(endings: Patches, displacement: Array, steps: Array) -> Array:
-    """Return the derivatives of endings' responses (q, r, c) at a `displacement` (nodes, 2) by `steps` (nodes, 2, c).
+    """Return the derivatives of responses (q, r, c) at a `displacement` (nodes, 2) along `steps` (nodes, 2, c).
 
-    By complex steps (Squire and Trapp 1998, SIAM Rev. 40, 110), exact to round-off.
+    They are complex-step derivatives (Squire and Trapp 1998, SIAM Rev. 40, 110), exact to round-off.
     """
     perturbed = cast("Array", displacement[:, :, None] + 1j * IMAGINARY * steps)
     return endings.responses(perturbed).imag / IMAGINARY
@@ -141,7 +141,7 @@ _STATE_NUMBERS = {name: state for state, name in STATE_NAMES.items()}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nearby:
-    """A settled slide, and those near it."""
+    """Full slip of a scene, and of scenes near it."""
 
     scene: Scene
     state: EquilibriumState
@@ -156,16 +156,16 @@ class Nearby:
         return self.responses(scenes)[:, 0]
 
     def responses(self, scenes: Sequence[Scene]) -> Array:
-        """Return every quantity (n, q, 2) of scenes that differ from its own in friction, depth or force alone.
+        """Return every quantity (n, q, 2) of scenes that differ from this one in friction, depth or force alone.
 
-        The last axis is the average over the ending and its midpoint. nan where no settled slide was found.
+        The last axis is the average over the ending, and its midpoint; nan where full slip was not found.
         """
         out = np.full((len(scenes), len(NAMES), 2), np.nan)
         near: dict[int, EquilibriumState] = {}
         for number, scene in enumerate(scenes):
             with suppress(NotConverged):
                 slide = self._slide(scene)
-                # where a state newly touches at an end of the skin, skin beyond may touch too
+                # where new contact includes an end of the skin, skin beyond it may touch too
                 if not (slide.touching & ~self.state.touching)[[0, -1]].any() and self._on_branch(slide):
                     near[number] = slide
         if near:
@@ -173,7 +173,7 @@ class Nearby:
         return out
 
     def _slide(self, scene: Scene) -> EquilibriumState:
-        """Return the settled slide of a scene, started from this one. Raises NotConverged."""
+        """Return full slip of a scene, started from this state. Raises NotConverged."""
         if isinstance(self.finger, LinearFinger):
             return _small_slide(self.finger, scene, self.state.state)
         newton, state = self.finger.newton, self.state
@@ -184,7 +184,7 @@ class Nearby:
         return solve_under_forces(newton, replace(state, load=load), force, Termination(_TOLERANCE))
 
     def _on_branch(self, near: EquilibriumState) -> bool:
-        """Return whether a state at finite strain lies on the branch of this one, as far as this mesh resolves."""
+        """Return whether a state at finite strain lies on the branch of this one, as far as this mesh resolves it."""
         if not isinstance(self.finger, FiniteFinger):
             return True
         beyond = near.load.mu > self.state.load.mu or near.load.depth > self.state.load.depth
@@ -196,8 +196,8 @@ class Nearby:
 def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
     """Yield the slide of each prediction.
 
-    None where the finger is only pressed or held by a drag, so that its state depends on its load path, and where the
-    state is not recovered.
+    Yields None where the finger is only pressed or held by a drag, so that its state depends on its load path, and
+    where the state is not recovered.
     """
     finger: Finger[Any] | None = None
     for prediction in predictions:
@@ -219,7 +219,7 @@ def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
 def stiffness_shares(predictions: Sequence[Prediction]) -> Array:
     """Return d log N / d log E (n, 4) by tissue of frictionless slides at small strain.
 
-    Raises ValueError for others, and where a state is not recovered.
+    Raises ValueError for other predictions, and where a state is not recovered.
     """
     prediction: list[Array] = []
     for slide in nearby(predictions):
@@ -235,12 +235,12 @@ def contact_states(skin: Skin) -> NDArray[np.int64]:
 
 
 def _small_slide(finger: LinearFinger, scene: Scene, guess: NDArray[np.integer]) -> EquilibriumState:
-    """Return the settled slide of a scene from a guess of its contact states. Raises ContactLost."""
+    """Return full slip of a scene from a guess of its contact states. Raises ContactLost."""
     return slide_from_guess(finger.newton, sliding_load(scene), guess, scene.normal_force)
 
 
 def _recover_slide(finger: FiniteFinger, prediction: Prediction) -> EquilibriumState:
-    """Return the settled slide of `prediction` at finite strain. Raises NotConverged where it is not recovered."""
+    """Return full slip of `prediction` at finite strain. Raises NotConverged where it is not recovered."""
     scene, skin, sense = prediction.scene, prediction.skin, -prediction.scene.loading.direction
     length = np.empty(len(skin.x))
     tributary(skin.x, finger.body.middle, length)

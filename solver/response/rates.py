@@ -1,8 +1,8 @@
 """Mean rates of the quantities at the ending in press, break-away and slide of a load path, with error estimates.
 
-For its errors the load path is marched again on the nested mesh, and in fewer steps on the answer's mesh
-(`solver.accuracy.error_estimate`). Edges of contact are left out where tissues relax, because their past holds for the
-given edges only.
+For error estimates the load path is marched again on the nested mesh, and in fewer steps on the answer's mesh
+(`solver.accuracy.error_estimate`). Edges of contact are left out where tissues relax, because the strain history is
+valid only for the given edges.
 """
 
 from collections.abc import Mapping
@@ -30,13 +30,13 @@ FULL_SLIP = 1.0 - 1e-9  # part of the touching nodes that slips when all do [-]
 class Rates(NamedTuple):
     """Mean rates of one quantity, in its unit per second; nan for a part that a load path does not have."""
 
-    press: float  # from first touch until the bone is slid or dragged along the surface
-    break_away: float  # from then until all of the contact slips
-    slide: float  # from then to the end: 0 once nothing changes any more
+    press: float  # from first touch until the bone slides or is dragged along the surface
+    break_away: float  # from there until all of the contact slips
+    slide: float  # from full slip to the end: 0 once the state is settled
 
 
 def rates(history: History) -> Mapping[str, Rates]:
-    """Return the mean rates of every quantity by its name; `course_errors` returns their errors."""
+    """Return the mean rates of every quantity by name; `course_errors` returns their errors."""
     time = np.concatenate([[0.0], history.time])  # undeformed at first touch
     values = np.concatenate([np.zeros((1, len(NAMES))), history.responses])
     first, last, end = instants(history)
@@ -45,12 +45,12 @@ def rates(history: History) -> Mapping[str, Rates]:
 
 
 def instants(history: History) -> tuple[int, int, int]:
-    """Return the numbers of instants up to the end of the press, up to full slip, and in all.
+    """Return the numbers of instants up to the end of the press, up to full slip, and in total.
 
-    A part that is not reached ends with the one before it.
+    A part that is not reached ends with the previous part.
     """
     count = len(history.time)
-    # A press without drag, before it is dragged, lets the bone move along the surface too.
+    # Under given forces the bone may move along the surface during the press too.
     moving = np.flatnonzero((history.time > PRESSING_TIME) & (np.abs(history.bone_x) > 0.0))
     first = int(moving[0]) if len(moving) else count
     slip = np.flatnonzero((history.slipping >= FULL_SLIP) & (np.arange(count) >= first))
@@ -64,27 +64,27 @@ def _mean(time: Array, values: Array, begin: int, end: int) -> Array:
     return growth / (step if step > 0.0 else np.nan)
 
 
-INSTANTS = ("press", "break_away", "slide")  # whose ends they are
+INSTANTS = ("press", "break_away", "slide")  # parts at whose ends the results are taken
 COURSE_NUMBERS = (
     "sed_ending",
     "sed_point",
     "normal_force",
     "tangential_force",
     "contact_width",
-)  # before the quantities
-_PLACES = [0, 6, 1, 2, 5]  # of those among `Finger.all_numbers`, which quantities follow from the seventh on
+)  # followed by the quantities
+_PLACES = [0, 6, 1, 2, 5]  # indices of these in `Finger.all_numbers`, in which quantities begin at index 7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CourseNumbers:
-    """The numbers of a load path at three instants and in three parts, or their errors; nan where there are none."""
+    """The results of a load path at three instants and in three parts, or their errors; nan for a missing part."""
 
-    value: Array  # (3, 5 + q) of INSTANTS: NUMBERS, then every quantity at the ending, each in its own unit
-    rate: Array  # (3, q) of the parts that end there, per second
+    value: Array  # (3, 5 + q) at INSTANTS: COURSE_NUMBERS, then every quantity at the ending, each in its unit
+    rate: Array  # (3, q) in the parts that end there, per second
 
 
 def course_numbers(course: History) -> CourseNumbers:
-    """Return the numbers of a load path."""
+    """Return the results of a load path."""
     table = np.column_stack([*(getattr(course, name) for name in COURSE_NUMBERS), course.responses])
     ends = instants(course)
     values = np.array(
@@ -119,7 +119,7 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
         edges += [_sum_of_edge_changes(scene, nested, state) for state in states]
     times = np.concatenate([[0.0], course.time])[[0, *ends]]
     of_quantities = np.concatenate([np.zeros((1, len(NAMES))), edges[:, len(COURSE_NUMBERS) :]])
-    with np.errstate(divide="ignore", invalid="ignore"):  # of a part that is not there
+    with np.errstate(divide="ignore", invalid="ignore"):  # of a missing part
         rate_edges = (of_quantities[1:] + of_quantities[:-1]) / np.diff(times)[:, None]
 
     def error(name: str, changed_by_edges: Array) -> Array:
@@ -133,7 +133,7 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
 
 
 def _sum_of_edge_changes(scene: Scene, nested: Finger[Any], state: EquilibriumState) -> Array:
-    """Return the changes of the numbers at an instant (5 + q,), summed over edges of contact that move by a node."""
+    """Return the changes of the results at an instant (5 + q,), summed over edges of contact that move by a node."""
     by_force = scene.normal_force is not None
     forces = ForceLoad(float(state.normal.sum()), None, state.load.travel) if by_force else None
     changes = edge_changes(nested.newton, [(state, forces)], nested.all_numbers)[1][0].sum(axis=0)

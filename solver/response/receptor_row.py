@@ -1,4 +1,4 @@
-"""Quantities along a row of receptors at any depth: of predictions with error estimates, of surveys without."""
+"""Quantities along a row of receptors at any depth: for predictions with error estimates, for surveys without."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -33,17 +33,17 @@ from solver.scene.tables import Receptor
 
 
 class Row(NamedTuple):
-    """Every quantity of `solver.quantities` (q, r) along a row of endings, each in its own unit."""
+    """Every quantity of `solver.quantities` (q, r) along a row of endings, each in its unit."""
 
-    values: Array  # nan where the finger ends before the ending does
-    errors: Array  # estimated, likewise; all nan where nothing is known
+    values: Array  # nan for endings outside the finger
+    errors: Array  # estimated; nan for endings outside the finger, all nan where unknown
 
 
 def responses_along(predictions: Sequence[Prediction], arcs: Array = ROW, receptor: Receptor | None = None) -> Array:
     """Return every quantity of `solver.quantities` (n, q, r) at arc positions (r,) [mm] of n predictions.
 
-    Each is averaged over an ending like that of `receptor`, or else of the scene: SA-I and RA endings lie less deep
-    than an SA-II. nan where the finger ends before the ending does. `row_along` has their errors too.
+    Each is averaged over an ending like that of `receptor`, by default the scene's: SA-I and RA endings are shallower
+    than SA-II endings. Values are nan for endings outside the finger. `row_along` returns their errors too.
     """
     out: list[Array] = []
     for _, run in groupby(predictions, lambda prediction: (id(prediction.geometry), prediction.scene.solve.kinematics)):
@@ -54,7 +54,7 @@ def responses_along(predictions: Sequence[Prediction], arcs: Array = ROW, recept
 
 
 def row_along(prediction: Prediction, arcs: Array = ROW, receptor: Receptor | None = None) -> Row:
-    """Return the same of one prediction with error estimates, for which its nested mesh is solved again."""
+    """Return `responses_along` of one prediction with error estimates, for which its nested mesh is solved again."""
     values = responses_along([prediction], arcs, receptor)[0]
     try:
         errors = _row_errors(prediction, values, arcs, receptor or prediction.scene.receptor)
@@ -104,14 +104,14 @@ def _row_patches(prediction: Prediction, arcs: Array, receptor: Receptor) -> Pat
     return FinitePatches(FiniteBody.of(mesh, finite_laws(materials), checked=True), row)
 
 
-_FINENESS = 6.0  # elements to a tip radius, at small strain
+_FINENESS = 6.0  # elements per tip radius, at small strain
 
 
 def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> Array:
-    """Return every quantity (n, q, r) of settled slides at endings at arc positions [mm]; nan where there is none.
+    """Return every quantity (n, q, r) in full slip at endings at arc positions [mm]; nan where it does not exist.
 
-    All scenes are of one finger and one kinematics. At small strain they share a mesh; at finite strain those pressed
-    alike do, each begun at the one with less friction. Raises as `Finger.of`.
+    All scenes have one finger and one kinematics. At small strain all share a mesh; at finite strain those of one
+    loading do, and each starts from the one with less friction. Raises as `Finger.of`.
     """
     out = np.full((len(scenes), len(NAMES), len(arcs)), np.nan)
     if not scenes:
@@ -136,7 +136,7 @@ def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> 
 
 
 def _sound_state(finger: Finger[Any], scene: Scene, near: EquilibriumState | None) -> EquilibriumState:
-    """Return the settled slide, at finite strain sought from `near`. Raises SolveFailure, also where it is unsound."""
+    """Return full slip, at finite strain started from `near`. Raises SolveFailure, also where it is unsound."""
     if isinstance(finger, FiniteFinger):
         state = rough_state(finger, scene, near)
         usable = is_sound(finger, state)

@@ -1,4 +1,4 @@
-"""Solve scenes of one finger at small strain on a mesh that they share, each with an error estimate.
+"""Solve scenes of one finger at small strain on a shared mesh, each with an error estimate.
 
 Settled sliding is solved directly, and refused where it does not exist. A load path is marched step by step, in time
 where tissues relax (`solver.equilibrium.relaxation`).
@@ -54,7 +54,7 @@ class SmallMeshing(Meshing):
     def __init__(self, scenes: Sequence[Scene], depths: Sequence[float], progress: Progress | None) -> None:
         """Start without meshes."""
         super().__init__(scenes, depths, progress)
-        self._fingers: dict[Sizing, tuple[LinearFinger, float]] = {}  # and what each took to make [s]
+        self._fingers: dict[Sizing, tuple[LinearFinger, float]] = {}  # and the time to make each [s]
 
     def _finger(self, scene: Scene, sizing: Sizing) -> tuple[LinearFinger, float]:
         if sizing not in self._fingers:
@@ -64,26 +64,26 @@ class SmallMeshing(Meshing):
         return self._fingers[sizing]
 
     def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:
-        """Do as `Meshing` says; where contact leaves the skin considered, solve all on a mesh with more of it."""
+        """Return the answers as `Meshing`; where contact leaves the skin considered, solve all on a mesh with more."""
         self._fingers = {sizing: entry for sizing, entry in self._fingers.items() if sizing.fineness == fineness}
         deep = max(self.deepest.values())
-        most = max(deep, min(WIDE_MARGIN * deep, scenes[0].finger.pulp_thickness()))  # for drags that lay much on
+        most = max(deep, min(WIDE_MARGIN * deep, scenes[0].finger.pulp_thickness()))  # for drags with much contact
         narrow, wide = (Sizing(fineness, depth, margin=WIDE_MARGIN) for depth in (deep, most))
         try:
             results = self._on_mesh(scenes, narrow, watch, last=False)
             return self._on_mesh(scenes, wide, watch, last=True) if len(results) < len(scenes) else results
-        except NotConverged as failure:  # a mesh does not stand for a body
+        except NotConverged as failure:  # the stiffness of a mesh is lost in round-off
             return [failure] * len(scenes)
 
     def _on_mesh(self, scenes: list[Scene], sizing: Sizing, watch: Watch | None, *, last: bool) -> list[Answer]:
         """Return the answers on one mesh; an empty list where contact leaves the skin that this mesh considers.
 
-        Settled slides are solved by falling friction, since the steepest has the longest contact. On the `last` mesh a
-        scene whose contact leaves that skin gets a failure.
+        Full slip is solved by falling friction, since the steepest has the longest contact. On the `last` mesh a scene
+        whose contact leaves that skin gets a failure.
         """
         finger, setup_s = self._finger(scenes[0], sizing)
         answers: dict[int, Answer] = {}
-        # Settled slides take milliseconds and share one estimate; a load path is watched as soon as it is marched.
+        # Full slip takes milliseconds and shares one estimate; `watch` receives a load path as soon as it is marched.
         every = range(len(scenes))
         steepest_first = sorted(every, key=lambda number: -float(scenes[number].friction.mu))
         stepwise = any(scene.solve.course == "history" for scene in scenes)
@@ -115,7 +115,7 @@ class SmallMeshing(Meshing):
     def _solve_state(self, scene: Scene, finger: LinearFinger, position: int, count: int) -> SceneSolution | None:
         """Return the state of one of `count` scenes; None where contact leaves the skin that the mesh considers.
 
-        Where the load path is asked for, an earlier slide that never settles is refused with its limits. Raises
+        Where the scene requests the load path, an earlier slide without full slip is refused with its limits. Raises
         SolveFailure.
         """
         start = perf_counter()
@@ -127,7 +127,7 @@ class SmallMeshing(Meshing):
             steps = choose_steps(scene, finger, settled=steady)
             step_factor = steps_of_press(scene, finger) if steps is None else steps.factor
         except SolveFailure:
-            steps, step_factor = Steps(1, np.zeros(COUNT), np.zeros(COUNT)), 1  # there will be no estimate either
+            steps, step_factor = Steps(1, np.zeros(COUNT), np.zeros(COUNT)), 1  # no estimate follows either
         if step_factor > 1 and steps is not None:
             steady = state_on_branch(scene, finger, step_factor)
         path, state, relaxing = None, steady, history and scene.materials.relax
@@ -154,7 +154,7 @@ class SmallMeshing(Meshing):
         return replace(solution, warnings=warnings, wall_s=perf_counter() - start + finger.solve_s / count)
 
     def _predict(self, solutions: list[SceneSolution], finger: LinearFinger, sizing: Sizing) -> list[Prediction]:
-        """Return the prediction of each state with its error estimate; the numbers of all are computed together."""
+        """Return the prediction of each state with its error estimate; all results are computed together."""
         start = perf_counter()
         numbers = finger.all_numbers([solution.state for solution in solutions])
         displacements = np.stack([solution.displacement for solution in solutions], axis=2)
@@ -178,8 +178,8 @@ def _remove_round_off(
 ) -> tuple[Solution, dict[str, float]]:
     """Return a solution without its round-off, and its audits.
 
-    With `always` it takes one step at least, otherwise where audits show round-off. Tissue that relaxes has forces of
-    its own, which are no round-off.
+    With `always` it takes at least one step, otherwise only where audits show round-off. Relaxing tissue has additional
+    forces, which are not round-off.
     """
 
     def correct(current: Solution, _: object = None) -> tuple[Solution, dict[str, float]]:
@@ -193,9 +193,9 @@ def _remove_round_off(
 def nested_numbers_of_all(
     mesh: LinearFinger, solutions: Sequence[SceneSolution], numbers: Array
 ) -> list[NestedNumbers | NotConverged]:
-    """Return the numbers of solved scenes on the nested `mesh`, or why a scene has none there.
+    """Return the results of solved scenes on the nested `mesh`, or the failure of a scene there.
 
-    `numbers` (c, COUNT) are those on the mesh of the answers.
+    `numbers` (c, COUNT) are the results on the mesh of the answers.
     """
     states: dict[int, EquilibriumState] = {}
     for number, solution in enumerate(solutions):

@@ -1,4 +1,4 @@
-"""Solve scenes to a prediction with an error estimate each, refining the mesh until tolerances are met."""
+"""Solve scenes to predictions with error estimates, refining the mesh until tolerances are met."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -26,22 +26,22 @@ from solver.response.small_answers import SmallMeshing
 from solver.scene import Scene
 
 LIMIT_ACCURACY = 0.03  # relative, of a friction limit
-USABLE_ESTIMATE = 0.1  # largest error estimate with which a coarser mesh's answer near a limit is still given
+USABLE_ESTIMATE = 0.1  # largest error estimate with which a coarser mesh's answer near a limit is given
 NEAR_LIMIT = "That mesh ends settled sliding at mu = {:.3g}, which is known to {:.0f} %: this state may lie beyond."
 TOLERANCE_MISSED = "The finest mesh leaves an error estimate above the tolerance, {}."
-# Of a mesh on which a scene without a state on the first is solved once more: 8 refuses the same of 316 scenes.
+# Of a mesh for scenes without a state on the first mesh: a fineness of 8 refuses the same ones of 316 scenes.
 LIMIT_FINENESS = 6.0
-FINENESS_RATIO = 1.2  # to the next mesh that is tried where one mesh may have no state by chance
-ASSUMED_ERROR = 4.0  # relative to the tolerance, where nothing is known of the error
+FINENESS_RATIO = 1.2  # to the next mesh to try where one mesh may have no state by chance
+ASSUMED_ERROR = 4.0  # error relative to the tolerance, where it is unknown
 MESHINGS: dict[str, type[Meshing]] = {"small": SmallMeshing, "finite": FiniteMeshing}  # by kinematics
-Rough = Callable[[Prediction], None]  # called with each answer that is to be refined, to be kept if work stops
+Rough = Callable[[Prediction], None]  # called with each answer before its refinement, to be kept if work stops
 
 
 def solve(scene: Scene, progress: Progress | None = None, *, rough: Rough | None = None) -> Prediction:
     """Return the prediction of one scene; `rough` as in `solve_many`.
 
-    Raises NoSteadyState where the scene has no settled sliding, NotConverged where none was found, SceneError where
-    its finger cannot be meshed, Cancelled where `progress` says so.
+    Raises NoSteadyState where the scene has no full slip, NotConverged where no state was found, SceneError where its
+    finger cannot be meshed, Cancelled where `progress` says so.
     """
     answer = solve_many((scene,), progress, rough=rough)[0]
     if isinstance(answer, SolveFailure):
@@ -52,19 +52,19 @@ def solve(scene: Scene, progress: Progress | None = None, *, rough: Rough | None
 def solve_many(
     scenes: Iterable[Scene], progress: Progress | None = None, watch: Watch | None = None, *, rough: Rough | None = None
 ) -> tuple[Prediction | SolveFailure, ...]:
-    """Return the prediction of each scene, in their order, or the failure that says why it has none.
+    """Return the prediction of each scene, in their order, or the failure that explains why it has none.
 
     Scenes with the same finger, materials and receptor share meshes. A scene that misses its tolerance is solved again
-    on a finer mesh. With a `contrast_tolerance`, surfaces that are pressed alike share a mesh on which the estimated
+    on a finer mesh. With a `contrast_tolerance`, surfaces under the same loading share a mesh on which the estimated
     error of their differences in SED meets it. A warning says where differences may be off by more than 5 % of their
     range.
 
-    At small strain `watch` receives each answer as soon as it is known: the position of its scene, the answer, the
+    At small strain `watch` receives each answer as soon as it is available: the position of its scene, the answer, the
     finger and the load path. It receives the answer again from every finer mesh. `rough` receives answers before they
     are refined or completed by evidence. Raises SceneError where a finger cannot be meshed, Cancelled where `progress`
     says so.
     """
-    by_id: dict[int, tuple[Answer, Answer]] = {}  # by its id, an answer and the same with evidence
+    by_id: dict[int, tuple[Answer, Answer]] = {}  # each answer without and with its evidence, by its id
 
     def add_evidence(answer: Answer) -> Answer:
         if id(answer) not in by_id:
@@ -96,7 +96,7 @@ def _answers(
 
 
 def _with_evidence(prediction: Answer, progress: Progress | None) -> Answer:
-    """Return a prediction with its evidence on omitted effects, as `scene.solve.evidence` asks; a failure as it is."""
+    """Return a prediction with the evidence on omitted effects that its scene requests; a failure unchanged."""
     if not isinstance(prediction, Prediction) or prediction.scene.solve.evidence == "quick":
         return prediction
     report_progress("estimating what the model leaves out")
@@ -122,7 +122,7 @@ def _with_earlier_slides(prediction: Prediction, solve: Answers) -> Prediction:
 
 
 def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
-    """Return the positions of scenes that share meshes, in the order of their first ones."""
+    """Return the positions of scenes in groups that share meshes, in the order of their first scenes."""
     out: dict[object, list[int]] = {}
     for position, scene in enumerate(scenes):
         key = (scene.solve.kinematics, scene.finger, scene.materials, scene.receptor)
@@ -131,7 +131,7 @@ def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
 
 
 def _within(watch: Watch | None, group: Sequence[int]) -> Watch | None:
-    """Return `watch` for the scenes of a `group`, called with positions among them."""
+    """Return `watch` for the scenes of a `group`, to be called with positions within the group."""
     if watch is None:
         return None
     return lambda number, answer, finger, path: watch(group[number], answer, finger, path)
@@ -152,7 +152,7 @@ def _solve_group(
 def _march(scenes: list[Scene], meshing: Meshing, watch: Watch | None) -> list[Answer]:
     """Return the answers of load paths, each marched once, on the finest mesh that a settled state needs.
 
-    Warnings of a settled state hold for its load path too.
+    Warnings of a settled state apply to its load path too.
     """
     ends = [replace(scene, solve=replace(scene.solve, course="steady")) for scene in scenes]
     refinement = _refine(ends, meshing, None, None)
@@ -175,20 +175,20 @@ class _Refinement(NamedTuple):
     """The answers of scenes that share meshes, after the last refinement."""
 
     answers: list[Answer]
-    warnings: list[tuple[str, ...]]  # of each answer, about what the finest mesh leaves open
+    warnings: list[tuple[str, ...]]  # of each answer, about errors that the finest mesh leaves
 
 
 def _refine(scenes: list[Scene], meshing: Meshing, watch: Watch | None, rough: Rough | None) -> _Refinement:
-    """Refine until every error estimate meets its tolerance, those of contrasts too, or no mesh may be finer.
+    """Refine until every error estimate meets its tolerance, including those of contrasts, or no mesh may be finer.
 
     Scenes that share a mesh share the finer one. Where that has no state, `_coarser_counts` decides which answer stays.
     """
     contrast_sets = compared_sets(scenes)
     answers: dict[int, Answer] = {}
-    best: dict[int, Answer] = {}  # of each scene the answer with the smallest estimate
+    best: dict[int, Answer] = {}  # the answer of each scene with the smallest estimate
     failures: dict[int, SolveFailure] = {}  # on finer meshes, of scenes whose coarser answers count
     work: dict[float | Lines, list[int]] = {FIRST_FINENESS: list(range(len(scenes)))}
-    meshes: dict[int, float | Lines] = {}  # the last of each scene
+    meshes: dict[int, float | Lines] = {}  # the last mesh of each scene
     while True:
         for mesh, todo in work.items():
             results = meshing.answers([scenes[i] for i in todo], mesh, _within(watch, todo))
@@ -218,7 +218,7 @@ def _refine(scenes: list[Scene], meshing: Meshing, watch: Watch | None, rough: R
             if rough is not None and isinstance(answer, Prediction):
                 rough(answer)
     answers |= {i: best[i] for i, miss in enumerate(errors) if miss > 1.0}
-    if scenes[0].solve.kinematics == "finite":  # where a fine mesh may lose its way
+    if scenes[0].solve.kinematics == "finite":  # where a fine mesh may miss the state
         failures |= _fall_back(scenes, answers, meshing)
     contrast_of = {i: contrast for together, contrast in zip(contrast_sets, contrasts, strict=True) for i in together}
     errors = _errors(answers, failures, meshes)
@@ -232,9 +232,9 @@ def _error_reductions(
     contrast_sets: Sequence[Sequence[int]],
     contrasts: Sequence[ContrastError],
 ) -> dict[int, float]:
-    """Return by what factor the error of each scene that is solved again has to fall.
+    """Return the factor by which the error of each scene that is solved again must fall.
 
-    `errors` are those of all scenes by their tolerances, `contrasts` those of differences within each of
+    `errors` are those of all scenes relative to their tolerances, `contrasts` those of differences within each of
     `contrast_sets`. Surfaces that are compared are refined together.
     """
     out = {i: miss for i, miss in enumerate(errors) if miss > 1.0}
@@ -246,10 +246,10 @@ def _error_reductions(
 
 
 def _finer(answers: Mapping[int, Answer], reductions: Mapping[int, float]) -> dict[float | Lines, list[int]]:
-    """Return the scenes to be solved again by the finer mesh that each needs; none where no mesh may be finer.
+    """Return the scenes to solve again, grouped by the finer mesh that they need; empty where no mesh may be finer.
 
-    The errors of these `answers` have to fall by `reductions`. Scenes that share a mesh share the finer one. A scene
-    without a state is solved once more at `LIMIT_FINENESS`.
+    The errors of these `answers` must fall by the factors `reductions`. Scenes that share a mesh share the finer one. A
+    scene without a state is solved once more at `LIMIT_FINENESS`.
     """
     members: dict[FingerMesh | None, list[int]] = {}
     for i, answer in answers.items():
@@ -270,7 +270,7 @@ def _finer(answers: Mapping[int, Answer], reductions: Mapping[int, float]) -> di
 def _fall_back(scenes: list[Scene], answers: dict[int, Answer], meshing: Meshing) -> dict[int, SolveFailure]:
     """Solve scenes without a state on a coarser mesh than the first; return the failures that this replaces.
 
-    Under steep friction a single mesh may have no state by chance, and a slightly finer one is tried at last.
+    Under steep friction a single mesh may have no state by chance, so a slightly finer one is tried last.
     """
     failures: dict[int, SolveFailure] = {}
     for i, scene in enumerate(scenes):
@@ -294,8 +294,8 @@ def _is_doubtful(scene: Scene, failure: SolveFailure) -> bool:
 def _coarser_counts(coarser: Answer, failure: SolveFailure) -> bool:
     """Return whether the answer of a coarser mesh counts where a finer mesh has no state.
 
-    It does not where the finer mesh shows that no state exists, nor where its own error estimate is too large, as close
-    to a limit: then the limit is the answer.
+    It does not count where the finer mesh shows that no state exists, nor where its error estimate is too large, as it
+    is close to a limit: then the limit is the answer.
     """
     if not isinstance(coarser, Prediction) or not _is_doubtful(coarser.scene, failure):
         return False
@@ -311,7 +311,7 @@ def _loss(answer: Answer, coarser: Answer | None) -> SolveFailure | None:
 
 
 def _estimate(answer: Answer | None) -> float:
-    """Return the error estimate of an answer, 1 where it is not known."""
+    """Return the error estimate of an answer, 1 where it is unknown."""
     return answer.error_estimate if isinstance(answer, Prediction) and answer.nested is not None else 1.0
 
 
@@ -349,7 +349,7 @@ def _add_warnings(answer: Answer, sentences: tuple[str, ...]) -> Answer:
 def _errors(
     answers: Mapping[int, Answer], failures: Mapping[int, SolveFailure], meshes: Mapping[int, float | Lines]
 ) -> list[float]:
-    """Return the errors of all answers by their tolerances, 0 for coarser answers in place of `failures`."""
+    """Return the errors of all answers relative to their tolerances, 0 for coarser answers in place of `failures`."""
     return [
         0.0 if i in failures else _error_by_tolerance(answers[i], on_first=meshes[i] == FIRST_FINENESS)
         for i in sorted(answers)
@@ -357,10 +357,10 @@ def _errors(
 
 
 def _error_by_tolerance(answer: Answer, *, on_first: bool) -> float:
-    """Return an answer's error estimate relative to the tolerance of its scene, `ASSUMED_ERROR` where it is not known.
+    """Return an answer's error estimate relative to the tolerance of its scene, `ASSUMED_ERROR` where it is unknown.
 
-    A failure `on_first`, the first mesh, counts as unknown: a finer one may have a state. Where the free cut folds,
-    the error is unknown on finer meshes too, and counts as 0.
+    A failure on the first mesh (`on_first`) counts as unknown, because a finer mesh may have a state. Where the free
+    cut folds, the error is unknown on finer meshes too, and counts as 0.
     """
     if isinstance(answer, SolveFailure) and on_first:
         return ASSUMED_ERROR

@@ -1,9 +1,9 @@
 """Steppers for a live view, which follow the state of a finger and its SED through readings of its forces.
 
-At small strain the finger is condensed once to the skin that may touch: its stiffness, and the SED of the ending as a
-quadratic form of the skin's displacements. A reading then takes one search for contact states under given forces. At
-finite strain, a reading usually takes one iteration of Newton's method on the bordered system. The next reading
-continues from its residual.
+At small strain the stiffness is condensed once to the skin that may touch, and the ending's SED becomes a quadratic
+form of the skin's displacements. A reading then takes one search for contact states under given forces. At finite
+strain, a reading usually takes one iteration of Newton's method on the bordered system. The next reading continues from
+its residual.
 """
 
 from abc import ABC, abstractmethod
@@ -23,7 +23,7 @@ from solver.failures import ContactLost
 from solver.mesh.mesher import Sizing
 from solver.scene import Scene
 
-SLIDING_SHARE = 0.995  # fraction of the friction limit beyond which the tangential force means sliding
+SLIDING_SHARE = 0.995  # fraction of the friction limit beyond which the finger counts as sliding
 _MIN_FORCE = 1e-7  # normal force below which there is no contact [N/mm]
 
 
@@ -41,8 +41,8 @@ class Stepper(ABC):
     def __init__(self, finger: Finger[Patches], mu: float, tau: float = np.inf) -> None:
         """Start undeformed, on a surface with friction `mu` and traction bound `tau` [MPa]."""
         self.finger, self.newton = finger, finger.newton
-        self.mu = mu  # coefficient of friction, may change between readings [-]
-        self.tau = tau  # traction bound, may change between readings [MPa]
+        self.mu = mu  # coefficient of friction, which may change between readings [-]
+        self.tau = tau  # traction bound, which may change between readings [MPa]
         self.state = EquilibriumState.undeformed(self.newton.condensed)
 
     @property
@@ -52,15 +52,15 @@ class Stepper(ABC):
 
     @property
     def travel(self) -> float:
-        """Travel of the bone along +x while some skin stuck [mm]; forces do not determine the travel of a slide."""
+        """Travel of the bone along +x while some skin sticks [mm]; forces do not determine the travel in full slip."""
         return 0.0 - self.state.load.travel
 
     def step(self, normal: float, tangential: float) -> float:
         """Take one reading and return the SED averaged over the ending [MPa]; nan where no valid state was found.
 
-        `normal` [N/mm] presses the finger, `tangential` [N/mm] is the tangential force on it along +x. At small strain
-        the next reading then starts from the undeformed finger. At finite strain it does too; where that fails, the
-        next attempt follows once the normal force has decreased. A reading that is not a number changes no state.
+        `normal` [N/mm] presses the finger, `tangential` [N/mm] is the tangential force on it along +x. After an invalid
+        state the next reading starts from the undeformed finger. At finite strain, if that fails, the next attempt
+        waits until the normal force has decreased. A reading that is not finite changes no state.
         """
         normal, tangential = float(normal), float(tangential)  # the kernels take floats
         if not isfinite(normal + tangential):
@@ -79,7 +79,7 @@ class Stepper(ABC):
         """Return the result of `step` for forces [N/mm] within the friction limit."""
 
     def row(self) -> Array:
-        """Return the SED (r,) [MPa] of the endings at `prediction.ROW` in the last state; nan beyond the finger."""
+        """Return the SED (r,) [MPa] of the endings at `prediction.ROW` in the last state; nan outside the finger."""
         return self.finger.row.average(self.finger.displacement(self.state))
 
     def outline(self) -> Array:
@@ -106,7 +106,7 @@ class SmallStepper(Stepper):
     finger: LinearFinger
 
     def advance(self, normal: float, tangential: float) -> float:
-        """Do as `Stepper` says.
+        """Return the ending's SED [MPa] for forces [N/mm] within the friction limit; nan without a valid state.
 
         Backward Euler: a point sticks where it was, or slips from there against its friction force.
         """
@@ -146,20 +146,20 @@ class StepperControl:
 
     max_force_error: float = 0.02  # of a valid state, relative to the normal force
     retry_ratio: float = (
-        0.7  # ratio of the normal force to that of the last failure at which a lost state is tried again
+        0.7  # ratio of the normal force to that of the last failure, below which a lost state is tried again
     )
     restart_steps: int = 12  # load steps from the undeformed finger to the forces of a reading
-    restart_iterations: int = 3  # iterations for each of these
-    max_catch_up_iterations: int = 8  # for the last of these, and after an invalid state
+    restart_iterations: int = 3  # iterations for each restart step
+    max_catch_up_iterations: int = 8  # for the last restart step, and after an invalid state
     catch_up_step: float = (
-        1e-3  # displacement in an iteration that ends those, relative to the length scale of the body
+        1e-3  # displacement in an iteration that ends the catch-up, relative to the length scale of the body
     )
     min_stretch: float = 0.65  # of valid skin: it folds at 0.544, later on a coarse mesh
     max_kink: float = 0.3  # of valid skin: a coarse mesh has this where skin folds
-    large_step: float = 0.01  # displacement in an iteration after which another follows, likewise
-    max_iterations: int = 3  # then
+    large_step: float = 0.01  # displacement in an iteration after which another follows, relative to the length scale
+    max_iterations: int = 3  # for a reading with such displacements
     max_stiffness_ratio: float = 1e3  # ratio of bulk to shear stiffness from which a kept tangent diverges (nu 0.4995)
-    divergence: float = 0.4  # displacement in an iteration beyond which the state is lost, likewise
+    divergence: float = 0.4  # displacement in an iteration beyond which the state is lost, relative to the length scale
 
 
 _CONTROL = StepperControl()
@@ -176,7 +176,7 @@ class FiniteStepper(Stepper):
         self._lost_at: float | None = None  # normal force [N/mm]
         self._restart_failed = False  # whether the load steps from the undeformed finger failed
         self._forces_missed = False  # whether the forces of the last state differ too much
-        self._stiffness = 0.0  # derivative of the normal force by depth in the last iteration [N/mm per mm]
+        self._stiffness = 0.0  # derivative of the normal force with respect to depth, last iteration [N/mm per mm]
 
     def reset(self) -> None:
         """Return to the undeformed finger."""
@@ -184,11 +184,11 @@ class FiniteStepper(Stepper):
         self._lost_at, self._restart_failed, self._forces_missed = None, False, False
 
     def advance(self, normal: float, tangential: float) -> float:
-        """Do as `Stepper` says.
+        """Return the ending's SED [MPa] for forces [N/mm] within the friction limit; nan without a valid state.
 
         A state is lost where contact leaves the skin that may touch, and where the skin may have folded. The next
-        reading takes load steps from the undeformed finger. Where these fail, they are repeated once the normal force
-        has decreased. A state whose forces differ too much gives nan.
+        reading takes load steps from the undeformed finger. If these fail, they are repeated once the normal force has
+        decreased. A state whose forces differ too much gives nan.
         """
         if self._lost_at is None:
             return self._follow(normal, tangential)
@@ -249,9 +249,9 @@ class FiniteStepper(Stepper):
         return self.finger.sed_ending(state.u)
 
     def _expects_large_step(self, normal: float) -> bool:
-        """Return whether a large displacement is due, so that the first iteration keeps the last tangent.
+        """Return whether a large displacement is expected, so that the first iteration keeps the last tangent.
 
-        Such an iteration takes a third of the time, and a new tangent is of more use at its end.
+        Such an iteration takes a third of the time, and a new tangent is more useful after it.
         """
         missing = abs(normal - float(self.state.force[1]))
         far = _CONTROL.large_step * self.newton.length_scale
@@ -274,18 +274,18 @@ class FiniteStepper(Stepper):
         return state
 
 
-_FINENESS = {"small": 4.0, "finite": 2.7}  # meshes on which the response is good to about 1 % of its peak
+_FINENESS = {"small": 4.0, "finite": 2.7}  # meshes on which the response is accurate to about 1 % of its peak
 MARGIN = {
     "small": 4.0,
     "finite": 6.0,
-}  # relative to the indentation: height of undeformed skin up to which contact is considered
+}  # height of undeformed skin up to which contact is considered, relative to the indentation
 # A nine-node element as four quadrilaterals, and the local coordinates of their midpoints.
 QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
 MIDPOINTS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 
 
 class LivePicture:
-    """A finger as quadrilaterals, four to an element: `faces` (f, 4) of nodes at `rest` positions (n, 2) [mm]."""
+    """A finger as quadrilaterals, four per element: `faces` (f, 4) of nodes at `rest` positions (n, 2) [mm]."""
 
     def __init__(self, finger: Finger[Patches]) -> None:
         """Place a probe at the midpoint of each face."""

@@ -1,8 +1,8 @@
-"""Where the time of one solve goes: mesh, assembly, factorisation, contact, estimate.
+"""The parts of the time of one solve: mesh, assembly, factorisation, contact, estimate.
 
-A solve by the public face runs once to load everything, once timed, and once under a profiler. The profiler's shares
-are then of the time without it. Time in a function outside the solver counts for its caller. Time for the error
-estimate and for evidence counts as theirs, on whatever mesh.
+A solve by the public interface runs once to load everything, then timed, and once under a profiler. The profiler gives
+shares, the timed runs the total. Time in a function outside the solver counts for its caller. Time on any mesh for the
+error estimate or for evidence counts as estimate or evidence.
 """
 
 import cProfile
@@ -20,7 +20,7 @@ from solver.verification.methods import Kinematics
 from solver.verification.request import LeftOut, Request, clock, median_time, rows_within
 from solver.verification.truth import KINEMATICS, cases
 
-# Part of a solve by folder of the solver, or by file or compiled loop where that differs from the folder's.
+# Part of a solve by folder of the solver; by file or compiled loop where its part differs from the folder's.
 COST_PARTS = {
     "mesh": "mesh and tables", "body": "assembly", "constitutive": "assembly", "linalg": "factorisation",
     "contact": "contact", "quantities": "receptor", "equilibrium": "iteration", "continuation": "proof of existence",
@@ -47,7 +47,7 @@ class Cost:
     tolerance: float
     dofs: int
     took_s: float  # from scene to answer: median
-    setup_s: float  # from the answer, for its own mesh
+    setup_s: float  # from the answer, for its mesh
     wall_s: float
     estimate_s: float
     parts: dict[str, float]  # shares of `took_s`
@@ -67,7 +67,7 @@ def _cost(kinematics: Kinematics, tolerance: float) -> Cost:
     solve(scene)
     start, before = clock(), perf_counter()
     answer = solve(scene)
-    own = (clock() - start) / (perf_counter() - before)  # processor time by elapsed time, in which answers measure
+    own = (clock() - start) / (perf_counter() - before)  # processor time over elapsed time, which answers report
     span = median_time(partial(solve, scene), 5, 1.5)
     profile = cProfile.Profile()
     profile.enable()
@@ -85,7 +85,7 @@ def shares(profile: pstats.Stats) -> dict[str, float]:
     cache: dict[Function, dict[str, float]] = {}
 
     def parts(function: Function, above: frozenset[Function] = frozenset()) -> dict[str, float]:
-        """Return the parts that a function works for, as shares that sum to 1."""
+        """Return the shares of the parts that a function works for; they sum to 1."""
         if function[2] in ENTIRE:
             return {ENTIRE[function[2]]: 1.0}
         if function in cache:

@@ -1,6 +1,6 @@
-"""The solver's own error estimates against true errors, and the cost of an answer with a guaranteed tolerance.
+"""The solver's error estimates against true errors, and the cost of an answer with a guaranteed tolerance.
 
-Everything goes through the public face: scenes with a `tolerance` in, answers with their estimates out. The published
+All solves use the public interface: scenes with a `tolerance` in, answers with their estimates out. The published
 surfaces are solved together, random scenes one by one.
 """
 
@@ -21,7 +21,7 @@ from solver.verification.request import LeftOut, Request, median_time, rows_with
 from solver.verification.truth import KINEMATICS, TRUE_NUMBERS, cases, known_truths, mean_and_doubt
 
 _TOLERANCES = (0.01, 0.003, 0.001)
-_SMALL = 2e-4  # relative error below which an estimate may be any factor too large
+_SMALL = 2e-4  # relative error below which an estimate may be too large by any factor
 _MOST = 10.0  # largest ratio of estimate to true error
 CORRECTED = "corrected SED of the ending"
 GOALS = (TRUE_NUMBERS[0], CORRECTED, *TRUE_NUMBERS[1:])
@@ -30,7 +30,7 @@ RANDOM: dict[Kinematics, int] = {"small": 12, "finite": 6}  # scenes, as far as 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """One number of one answer: its estimated and its true error."""
+    """One result of one answer: its estimated and its true error."""
 
     kinematics: Kinematics
     case: str
@@ -41,8 +41,8 @@ class Estimate:
     error: float  # relative
     doubt: float  # of the truth, relative
     corrected: float | None = None  # error of the value on the nested mesh, relative
-    towards: bool = False  # whether this value lies on the truth's side of the answer
-    warned: bool = False  # whether the answer says that no trial holds for its estimate
+    towards: bool = False  # whether the corrected value lies on the truth's side of the answer
+    warned: bool = False  # whether the answer warns that it exceeds the trials of the estimates
 
     @property
     def above(self) -> bool | None:
@@ -70,9 +70,9 @@ class GuaranteedCost:
     surfaces: int  # number of surfaces solved together
     dofs: int
     took_s: float  # from scenes to answers, median
-    wall_s: float  # of which the solves on the last mesh
-    setup_s: float  # its mesh and tables
-    estimate_s: float  # its estimates
+    wall_s: float  # part of `took_s` for the solves on the last mesh
+    setup_s: float  # part for this mesh and its tables
+    estimate_s: float  # part for the estimates on it
     worst_estimate: float
     worst_error: float | None  # None where the truth of a surface is not certain to a third of the tolerance
 
@@ -131,14 +131,14 @@ def _random(request: Request, kinematics: Kinematics) -> Iterator[Estimate | Lef
 
 
 def compare(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.ndarray) -> list[Estimate]:
-    """Return the estimates of an answer's numbers with their errors against `truth` (3,) of relative `doubt` (3,).
+    """Return the estimates of an answer's results with their errors against `truth` (3,) of relative `doubt` (3,).
 
-    Nothing where the answer says that its errors are unknown.
+    Returns an empty list where the answer's errors are unknown.
     """
     if answer.nested is None:
         return []
     best, warned = answer.sed_ending_corrected, any(trial_warnings(answer.scene, answer.indentation))
-    numbers = (  # place in the truth, value and estimate of each of `GOALS`
+    numbers = (  # index in the truth, value and estimate of each of `GOALS`
         (0, answer.sed_ending, answer.error_estimate),
         (0, best, answer.corrected_error),
         (1, answer.normal_force, answer.normal_force_error),

@@ -1,4 +1,4 @@
-"""The truth of a random scene: its numbers on two uniformly fine meshes, and on one refined by its estimated error."""
+"""The truth of a random scene: its results on two uniformly fine meshes, and on one refined by its estimated error."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -19,7 +19,7 @@ from solver.response.solution import solve_many
 from solver.scene import Scene
 from solver.verification.methods import Kinematics
 
-# fineness, shift by half an element, and number of load steps by the usual; the first with a solution are used
+# fineness, shift by half an element, and factor on the usual load steps; the first meshes with a solution are used
 _MESHES: dict[tuple[Kinematics, bool], Sequence[tuple[float, bool, int]]] = {  # by kinematics, `depends_on_way`
     ("small", False): ((26.0, False, 1), (26.0, True, 1), (23.0, False, 1), (23.0, True, 1), (29.0, False, 1)),
     ("small", True): ((16.0, False, 12), (16.0, True, 14), (14.0, False, 16), (14.0, True, 13)),
@@ -27,7 +27,7 @@ _MESHES: dict[tuple[Kinematics, bool], Sequence[tuple[float, bool, int]]] = {  #
     ("finite", True): ((10.0, False, 4), (10.0, True, 5), (9.0, False, 6), (9.0, True, 4)),
 }
 ENOUGH = 2  # number of meshes used
-_REFINED = {"small": 2e-4, "finite": 1e-3}  # tolerance that refines the third
+_REFINED = {"small": 2e-4, "finite": 1e-3}  # tolerance that refines the third mesh
 
 
 def fine_numbers(scenes: Sequence[Scene]) -> Array:
@@ -45,7 +45,7 @@ def fine_numbers(scenes: Sequence[Scene]) -> Array:
 
 
 def _solve_refined(scenes: Sequence[Scene]) -> Array:
-    """Return the numbers (n, 3) of the nested mesh of answers with a tight tolerance."""
+    """Return the results (n, 3) on the nested mesh of answers with a tight tolerance."""
     tolerance = _REFINED[scenes[0].solve.kinematics]
     contrast = tolerance if len(scenes) > 1 else None
     answers = solve_many(

@@ -11,7 +11,7 @@ from solver.verification.truth import KINEMATICS, cases
 
 _MESHES = (3.0, 4.0, 6.0, 9.0, 13.0, 18.0, 26.0, 34.0, 46.0)
 _QUICK = (8.0, 11.0, 16.0)
-FEWEST = 3000  # fewest unknowns in the fit of the exponent: below, arithmetic does not dominate the time
+FEWEST = 3000  # fewest unknowns in the fit of the exponent: with fewer, arithmetic does not dominate the time
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ def measure(request: Request) -> Iterator[Growth | LeftOut]:
 
 def _row(fineness: float, kinematics: Kinematics) -> Growth:
     mesh = MESHED[kinematics](cases(kinematics)[0], fineness, False)
-    mesh.floor()  # the first run allocates memory, which takes as long as the work, and longer on large meshes
+    mesh.floor()  # the first run allocates memory, which takes at least as long as the work
     floor = median(mesh.floor() for _ in range(5 if mesh.dofs < 20000 else 3))
     return Growth(kinematics, fineness, mesh.dofs, mesh.setup_s, floor)
 

@@ -1,4 +1,4 @@
-"""A load path of 200 substeps against the settled state solved directly: the same state, at a multiple of the cost."""
+"""A load path of 200 substeps against the directly solved settled state: the same state at a multiple of the cost."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

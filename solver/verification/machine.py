@@ -11,12 +11,12 @@ from solver.verification.request import Request
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """One machine at one moment. Times on a busy machine are longer than the solver's own."""
+    """One machine at one moment. Times on a busy machine include those of other work."""
 
     system: str
     processor: str
     cores: int
-    threads: str  # threads of linear algebra, by the environment variable
+    threads: str  # threads of linear algebra, from the environment variable
     load: float | None  # running processes, mean of the last minute; None where the system does not report it
     versions: dict[str, str]
 
@@ -32,7 +32,7 @@ def measure(request: Request) -> Iterator[Machine]:
 
 
 def _processor() -> str:
-    """Return the processor's own name where the system reports it."""
+    """Return the processor's model name where the system reports it, else its type."""
     info = Path("/proc/cpuinfo")
     if info.exists():
         for line in info.read_text(encoding="utf-8", errors="replace").splitlines():

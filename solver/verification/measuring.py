@@ -1,4 +1,4 @@
-"""Run the subjects one after another within the time there is; an early end keeps the rows so far."""
+"""Run the subjects one after another within the available time; an early end keeps the rows so far."""
 
 import datetime
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -33,7 +33,7 @@ from solver.verification.request import Host, LeftOut, Request
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-FULL_S, QUICK_S = 140.0, 12.5  # time for the subjects; a running item is finished, and drawing takes more
+FULL_S, QUICK_S = 140.0, 12.5  # time for the subjects; running items are finished, and drawing takes additional time
 _ALWAYS = ("machine", "targets")  # run even after a stop, since they take no time
 Progress = Callable[[float, str], None]
 R = TypeVar("R")
@@ -45,13 +45,13 @@ class Subject:
 
     name: str  # key in the JSON file
     doing: str  # shown while it runs
-    share: float  # share of the time; unused time is left to later subjects
+    share: float  # share of the time; later subjects get unused time
     quick_share: float
     measure: "Callable[[Request], Iterator[DataclassInstance]]"
     kinds: "tuple[type[DataclassInstance], ...]"  # of its rows
 
 
-# In order: a later subject may use the rows of an earlier one, and processes take their time whatever is left.
+# The order matters: a subject may use the rows of earlier ones, and processes run even without time left.
 _SUBJECTS = (
     Subject("machine", "machine", 0.0, 0.0, machine.measure, (machine.Machine,)),
     Subject("truth", "overkill solves for the truth", 30.0, 1.5, truth.measure, (truth.Truth,)),
@@ -124,7 +124,7 @@ def measure(
 ) -> RunResults:  # fmt: skip
     """Run the subjects and return their results. Ctrl-C ends the run and keeps the rows so far.
 
-    The run takes `seconds` of `clock`. With a clock of processor time, a busy machine measures as much as an idle one.
+    The run takes `seconds` of `clock`. With a processor-time clock, a busy machine measures as much as an idle one.
     """
     begun = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     warm_up(progress)  # before the clock starts: the first run on a machine compiles, later ones load

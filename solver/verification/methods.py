@@ -1,4 +1,4 @@
-"""A finger on one mesh, measured by one interface for both kinematics."""
+"""A finger on one mesh, with one interface for measurements in both kinematics."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -29,11 +29,11 @@ AnyFinger = TypeVar("AnyFinger", bound=Finger[Any])
 
 
 class MeshMethod(ABC, Generic[AnyFinger]):
-    """One finger on one mesh; `fineness` is elements to a tip radius, `shift` moves its lines by half an element."""
+    """One finger on one mesh; `fineness` is elements per tip radius, `shift` moves the lines by half an element."""
 
     finger: AnyFinger
     setup_s: float  # mesh and tables
-    prepared_s = 0.0  # assembly and factorisation that all surfaces share; 0 where each surface has its own
+    prepared_s = 0.0  # assembly and factorisation that all surfaces share; 0 where they are part of each solve
 
     @property
     def dofs(self) -> int:
@@ -44,7 +44,7 @@ class MeshMethod(ABC, Generic[AnyFinger]):
     def solve(self, scene: Scene, before: EquilibriumState | None = None) -> EquilibriumState:
         """Return the settled state of `scene`, from the undeformed finger or from the state of a similar surface.
 
-        Raises SolveFailure where there is none.
+        Raises SolveFailure where no state exists.
         """
 
     @abstractmethod
@@ -56,7 +56,7 @@ class MeshMethod(ABC, Generic[AnyFinger]):
         return self.numbers_together([state])[0]
 
     def numbers_together(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return these numbers for several states (n, 3)."""
+        """Return `numbers` of several states (n, 3)."""
         return np.abs(self.finger.numbers(states))
 
 
@@ -85,7 +85,7 @@ class SmallMethod(MeshMethod[LinearFinger]):
 
 
 class FiniteMethod(MeshMethod[FiniteFinger]):
-    """Finite strain on one mesh, started on a coarse one, which is kept for other surfaces."""
+    """Finite strain on one mesh, started from a coarse mesh, which is kept for other surfaces."""
 
     def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
         """Mesh the finger of `scene`."""

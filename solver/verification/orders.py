@@ -13,7 +13,7 @@ from solver.verification.published import contacts, locking
 from solver.verification.request import LeftOut, Request, clock, rows_within
 from solver.verification.truth import KINEMATICS, cases
 
-Errors = Sequence[float]  # or sizes, or times
+Errors = Sequence[float]  # errors, sizes or times
 Size = TypeVar("Size", int, float)
 Value = TypeVar("Value")
 
@@ -26,7 +26,7 @@ class Order:
     quantity: str
     kinematics: str
     element: str
-    sizes: tuple[float, ...]  # element sizes, by the coarsest
+    sizes: tuple[float, ...]  # element sizes, relative to the coarsest
     errors: tuple[float, ...]  # relative; for contact, root mean square over meshes of nearly one size
     took_s: tuple[float, ...]  # of the solves that gave each error
     order: float  # observed: slope of the least-squares line through the logarithms

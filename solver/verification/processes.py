@@ -1,4 +1,4 @@
-"""Measurements that need a process of their own: the cold start of `daq-app solve`, and the memory of one solve."""
+"""Measurements in separate processes: the cold start of `daq-app solve`, and the memory of one solve."""
 
 import json
 import os
@@ -25,7 +25,7 @@ kinematics = "{kinematics}"
 """
 TOLERANCE = 0.0015  # of the solve whose memory is measured
 _LONGEST = 60.0  # seconds after which a process is stopped
-# Code of a process of its own: idle memory is measured with loops loaded, and the peak restarts there (Linux only).
+# Code of a separate process: idle memory is measured with loops loaded, then the peak is reset (Linux only).
 MEMORY = """
 import json
 from dataclasses import replace
@@ -99,7 +99,7 @@ def _commands(folder: Path, python: tuple[str, ...]) -> list[tuple[str, list[str
 
 
 def _run(command: list[str]) -> tuple[float, float]:
-    """Return processor time and elapsed time of a process; elapsed time twice where the system reports no first."""
+    """Return processor and elapsed time of a process; elapsed time twice where the system reports no processor time."""
     start, before = perf_counter(), _of_children()
     subprocess.run(command, check=True, capture_output=True, timeout=_LONGEST)
     wall_s, spent = perf_counter() - start, _of_children() - before

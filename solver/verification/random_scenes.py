@@ -2,12 +2,12 @@
 
 | set | scenes |
 | --- | --- |
-| axis | a published surface with one random number of finger, tissues, friction, loading or receptor |
-| fingers | all lengths within 30 % of the published ones, or, in every other, random (tip radius 3.5 to 8 mm) |
+| axis | a published surface with one random value of finger, tissues, friction, loading or receptor |
+| fingers | all lengths within 30 % of the published ones, or, in every other scene, random (tip radius 3.5 to 8 mm) |
 | extreme | tissues 1e-3 to 1e6 times as stiff as fat, layers of 2 to 60 % of the tip |
 | edge | a receptor in the epidermis beneath an edge of contact |
 | bounds | a traction bound of 1 to 10 kPa |
-| forces | a prescribed normal force, in half of them also a drag |
+| forces | a prescribed normal force, in half of the scenes also a drag |
 | courses | a slide that reverses, a press with friction, or a history of relaxing tissues |
 | deep | a press by 50 to 80 % of the tissue between skin and bone |
 | stiff | skin 8 to 100 times as stiff as fat, or at finite strain Ogden's law with an exponent of 3 to 14 |
@@ -25,7 +25,7 @@ from solver.scene.published import scenes
 from solver.scene.tables import Finger, Friction, Loading, Material, Materials, Receptor, Relaxation, SceneError, Solve
 from solver.verification.methods import Kinematics
 
-CLOSE = 0.06  # largest difference of coefficients from the first, in every other set of surfaces
+CLOSE = 0.06  # largest difference of coefficients from the first one, in every other set of surfaces
 Draw = np.random.Generator
 
 
@@ -116,7 +116,7 @@ def _extreme(draw: Draw, _: int, __: Kinematics) -> Scene:
 def _edge(draw: Draw, _: int, __: Kinematics) -> Scene:
     scene = _common(draw)
     along = _by_logarithm(draw, 0.3, 3.0)
-    depth = draw.uniform(0.5, 2.0) * (along / 2.0) ** 2 / (2.0 * scene.finger.tip_radius)  # ends near the ending's
+    depth = draw.uniform(0.5, 2.0) * (along / 2.0) ** 2 / (2.0 * scene.finger.tip_radius)  # ends near the ending's ends
     receptor = Receptor(draw.uniform(0.1, 0.7), (0.05, along))
     return replace(scene, receptor=receptor, loading=replace(scene.loading, indentation=depth))
 

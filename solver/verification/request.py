@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
 Kind = TypeVar("Kind")
 Row = TypeVar("Row")
-# Processor time of this thread: on an idle machine the elapsed time, on a busy one the solver's own.
-# Elapsed time is used where the system's counter is too coarse.
+# Processor time of this thread, which excludes other work of a busy machine. Where the system's counter is too coarse,
+# elapsed time.
 PROCESSOR_TIME = get_clock_info("thread_time").resolution <= 1e-6
 clock = thread_time if PROCESSOR_TIME else perf_counter
 
@@ -36,7 +36,7 @@ class Host:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """Limits of a measurement, and the rows of all subjects before it.
+    """Limits of a measurement, and the rows of all earlier subjects.
 
     No work starts after the instant `until` of the clock `now`.
     """
@@ -62,7 +62,7 @@ class Request:
 
 
 def repetitions(count: int, most_s: float) -> Iterator[int]:
-    """Yield the numbers up to `count` for `most_s` seconds of `clock`, the first at least."""
+    """Yield the numbers below `count` for `most_s` seconds of `clock`, at least the first."""
     start = clock()
     for number in range(count):
         yield number
@@ -83,7 +83,7 @@ def median_time(work: Callable[[], object], repeats: int = 5, most_s: float = 1.
 def rows_within(
     request: Request, work: Iterable[Kind], what: str, rows: Callable[[Kind], Iterable[Row]]
 ) -> Iterator[Row | LeftOut]:
-    """Yield the `rows` of each item of `work` until the time is up, of one at least; then report the omitted items."""
+    """Yield the `rows` of each item of `work` until the time is up, at least of one; then report the omitted items."""
     items = list(work)
     for number, item in enumerate(items):
         if number and request.seconds_left <= 0.0:

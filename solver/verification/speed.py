@@ -13,7 +13,7 @@ from solver.verification.methods import MESHED, FiniteMethod, Kinematics, SmallM
 from solver.verification.request import LeftOut, Request, clock, median_time, repetitions, rows_within
 from solver.verification.truth import JUDGED, Truth, cases, known_truths
 
-MESHES: dict[Kinematics, tuple[float, ...]] = {  # elements to a tip radius
+MESHES: dict[Kinematics, tuple[float, ...]] = {  # elements per tip radius
     "small": (2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0),
     "finite": (5.5, 6.5, 8.0, 10.0, 12.0, 16.0, 20.0),
 }
@@ -23,7 +23,7 @@ QUICK: dict[Kinematics, tuple[float, ...]] = {"small": (2.5, 3.0, 5.0, 8.0), "fi
 
 @dataclass(frozen=True, slots=True)
 class Speed:
-    """One mesh. Times are medians; errors are relative, by case, of SED, normal force and drag."""
+    """One mesh. Times are medians; errors are relative, for SED, normal force and drag of each case."""
 
     kinematics: Kinematics
     fineness: float
@@ -32,9 +32,9 @@ class Speed:
     prepared_s: float  # assembly and factorisation shared by all surfaces
     floor_s: float  # one assembly, factorisation and solve of the same system
     first_s: float  # one surface from undeformed, `prepared_s` included: median over the cases
-    next_s: float | None  # each further surface; None where no two are neighbours
+    next_s: float | None  # each further surface; None where no two have the same loading
     all_s: float  # all cases one after another, `prepared_s` included
-    surfaces: int  # number of these cases
+    surfaces: int  # number of cases in `all_s`
     errors: dict[str, tuple[float, ...]]
     failed: dict[str, str]  # cases without an answer on this mesh, and why
 
@@ -44,7 +44,7 @@ class Speed:
         return self.largest_error({}) if self.errors.keys() >= set(JUDGED) else None
 
     def largest_error(self, doubts: Mapping[str, float]) -> float:
-        """Return the largest that this error may be where the truth of a case is off by its doubt."""
+        """Return the largest SED error on the judged cases if each truth is off by its doubt."""
         return max(self.errors[name][0] + doubts.get(name, 0.0) for name in JUDGED)
 
 
@@ -64,7 +64,7 @@ def measure(request: Request) -> Iterator[Speed | LeftOut]:
 
 
 def _row(kind: Kinematics, fineness: float, truths: dict[str, Truth], patience: float) -> Speed:
-    """Return the row of one mesh; `patience` is the time for repetitions, by that of a full run."""
+    """Return the row of one mesh; `patience` is the time for repetitions, relative to a full run."""
     surfaces = [scene for scene in cases(kind) if scene.title in truths]
     deepest = max(surfaces, key=lambda scene: scene.loading.depth)
     preparation, setup, floors_before = _prepare(kind, deepest, fineness, 0.3 * patience)
@@ -86,7 +86,7 @@ def _row(kind: Kinematics, fineness: float, truths: dict[str, Truth], patience: 
         first.append(median_time(lambda s=scene: mesh.numbers(mesh.solve(s)), 5, 0.25 * patience))
     together = median_time(lambda: mesh.numbers_together([mesh.solve(scene) for scene in solvable]), 5, 0.5 * patience)
     onward, between = _onward(mesh, solvable, patience)
-    floors = floors_before if preparation else between  # measured at the same time as most of the work
+    floors = floors_before if preparation else between  # measured at the same time as most of this work
     next_s = median(onward) if onward else None
     return Speed(
         kind, fineness, mesh.dofs, setup, preparation, median(floors),
@@ -95,9 +95,9 @@ def _row(kind: Kinematics, fineness: float, truths: dict[str, Truth], patience: 
 
 
 def _prepare(kind: Kinematics, scene: Scene, fineness: float, most_s: float) -> tuple[float, float, list[float]]:
-    """Return median times of a mesh's assembly and factorisation, and of the rest, and floors measured in between.
+    """Return median times of a mesh's assembly and factorisation, and of its setup, and floors measured in between.
 
-    Each mesh is released before the next is made, as in a process that solves again and again with the same memory.
+    Each mesh is released before the next is made, as in a process that solves repeatedly in the same memory.
     """
     spans: list[tuple[float, float]] = []
     floors: list[float] = []
@@ -111,10 +111,10 @@ def _prepare(kind: Kinematics, scene: Scene, fineness: float, most_s: float) -> 
 
 
 def _onward(mesh: SmallMethod | FiniteMethod, scenes: list[Scene], most_s: float) -> tuple[list[float], list[float]]:
-    """Return the time of each surface that starts from the one solved before, at the same depth and direction.
+    """Return the time of each surface that starts from the previous one, at the same depth and direction, and floors.
 
     Times are medians over passes through `scenes` in the solver's order, after a first pass that makes the meshes. The
-    floor is measured after each: the speed of a machine changes within a second, and both must see the same speed.
+    floor is measured after each solve, because the speed of a machine changes within a second.
     """
     scenes = sorted(scenes, key=solution_order)
     spans: dict[str, list[float]] = {}

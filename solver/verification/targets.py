@@ -1,7 +1,7 @@
 """Targets for the solver's speed, row by row: required and desired value, measured value, met or missed.
 
-A speed belongs to a true error. It is the time of the cheapest mesh, without the estimate, mesh and tables, whose error
-on slipperiness 0 to 100 and stickiness 0 stays below that wherever the truth may lie. The floor is one assembly,
+A speed belongs to a true error. It is the time on the cheapest mesh, without the estimate, mesh and tables, whose error
+on slipperiness 0 to 100 and stickiness 0 stays below this error within the truth's doubt. The floor is one assembly,
 factorisation and solve of the same system, timed in the same run.
 """
 
@@ -22,12 +22,12 @@ from solver.verification.truth import JUDGED, KINEMATICS, cases, known_truths
 from solver.verification.warm import WARM_SCENES, Warm
 
 _AGREED = 1e-10  # largest relative difference of a load path from the direct state
-PEAK = 0.02  # largest error of the warm stepper, by the peak
+PEAK = 0.02  # largest error of the warm stepper, relative to the peak
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """One row. Times in ms; `reach` and `aim` are None in a row that only reports."""
+    """One row. Times are in ms; `reach` and `aim` are None in a row that only reports."""
 
     work: str
     at_error: str
@@ -35,14 +35,14 @@ class Target:
     reach: float | None
     aim: float | None
     measured: float | None = None  # None: not measured, or no mesh met the error
-    floors: float | None = None  # `measured` by the floor
+    floors: float | None = None  # `measured` relative to the floor
     how: str = ""  # method, mesh and error
     tried: bool = True  # whether all candidates were measured before the time was up
-    part: str = ""  # the measured part, where it is not all that was required
+    part: str = ""  # the measured part, where it is less than required
 
     @property
     def verdict(self) -> str:
-        """Say whether the target was met."""
+        """Whether the target was met, as a phrase."""
         if self.measured is None:
             return "missed" if self.tried and self.how != "" else "not measured"
         if self.reach is None:
@@ -109,7 +109,7 @@ def _at_error(
 
 
 def _error(row: Speed, doubts: Mapping[str, float]) -> str:
-    """Return the largest error of a mesh, and what it may be where the truth is in doubt."""
+    """Return the largest error of a mesh, and its upper bound within the truth's doubt."""
     return f"{percent(row.largest_error({}))}, {percent(row.largest_error(doubts))} at most"
 
 

@@ -1,8 +1,8 @@
-"""The reference cases and their truth: very fine solves on meshes with other nodes, made in the same run.
+"""The reference cases and their truth: very fine solves on meshes with different nodes, made in the same run.
 
-The cases are the ten published surfaces, at small and at finite strain. The truth of a number is the mean of three
-solves on fine meshes, one of them moved along the skin by half an element. Its doubt is their distance from the mean.
-No truth is stored, so it is never older than the solver. A surface without settled sliding has the solver's refusal
+The cases are the ten published surfaces, at small and at finite strain. The truth of a result is the mean of three
+solves on fine meshes, one of them moved along the skin by half an element. Its doubt is their largest distance from the
+mean. No truth is stored, so it is never older than the solver. A surface without full slip has the solver's refusal
 instead.
 """
 
@@ -21,7 +21,7 @@ from solver.verification.request import LeftOut, Request, clock
 
 KINEMATICS = tuple(MESHED)
 TRUE_NUMBERS = ("SED of the ending", "normal force", "drag")
-# fineness of three meshes, finer than all whose speed is measured, and whether they are moved by half an element
+# fineness of three meshes, finer than those in `speed`, and whether they are moved by half an element
 SHIFTED = {
     "small": ((26.0, False), (26.0, True), (23.0, False)),
     "finite": ((30.0, False), (30.0, True), (26.0, False)),
@@ -36,12 +36,12 @@ JUDGED = ("slipperiness 0", "slipperiness 20", "slipperiness 55", "slipperiness 
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """The true numbers of one case, or the reason why it has no answer."""
+    """The true results of one case, or the reason why it has no answer."""
 
     kinematics: Kinematics
     case: str
     numbers: tuple[float, ...]  # SED [MPa], normal force, drag [N/mm]; empty where refused
-    doubt: tuple[float, ...]  # relative, of each: largest distance of the three solves from their mean
+    doubt: tuple[float, ...]  # of each: largest distance of the three solves from their mean, relative
     dofs: tuple[int, ...]  # of the three meshes
     took_s: float
     refused: str  # the solver's sentence, "" where there is an answer
@@ -53,14 +53,14 @@ def cases(kinematics: Kinematics) -> list[Scene]:
 
 
 def measure(request: Request) -> Iterator[Truth | LeftOut]:
-    """Yield the truth of every case; a quick run has coarser meshes, and the judged cases only."""
+    """Yield the truth of every case; a quick run has coarser meshes and only the judged cases."""
     for kinematics in KINEMATICS:
         surfaces = [s for s in cases(kinematics) if s.title in JUDGED or not request.quick]
         yield from _truths(request, kinematics, surfaces)
 
 
 def mean_and_doubt(solves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return mean and doubt (3,) of the numbers on three meshes (3, 3)."""
+    """Return mean and doubt (3,) of the results on three meshes (3, 3)."""
     mean = solves.mean(axis=0)
     return mean, np.abs(solves / np.where(mean > 0.0, mean, 1.0) - 1.0).max(axis=0)
 
@@ -79,7 +79,7 @@ def _truths(request: Request, kinematics: Kinematics, surfaces: list[Scene]) -> 
 
 
 def _truth(scene: Scene, meshes: Sequence[SmallMethod | FiniteMethod], setup_s: float) -> Truth:
-    """Return the truth of a case; the judged ones have one, and of others the solver is asked first."""
+    """Return the truth of a case; the solver decides whether a case outside `JUDGED` has one."""
     start, kinematics = clock(), scene.solve.kinematics
     try:
         if scene.title not in JUDGED:

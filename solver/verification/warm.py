@@ -1,9 +1,9 @@
-"""The warm stepper of a live view: its time a reading, and the error of its response while forces come in.
+"""The warm stepper of a live view: its time per reading, and the error of its response to a sequence of forces.
 
 The truth is a load path driven by depth on a finer mesh. The finger is pressed, slides, and lifts off while it slides,
-in so few readings that each moves it far. The stepper gets its forces, without noise and traction bound. A busy machine
-pauses processes for milliseconds, so each reading counts with its median over several passes; the percentile of one
-pass is given too.
+in so few readings that each moves it far. The stepper gets the path's forces, without noise and traction bound. A busy
+machine pauses processes for milliseconds, so the time of a reading is its median over several passes; the percentile of
+one pass is given too.
 """
 
 from collections.abc import Iterator
@@ -41,7 +41,7 @@ class Warm:
     median_s: float
     p99_s: float  # of each reading's median over the passes
     once_p99_s: float  # of the last pass alone
-    worst_error: float  # of the SED, by its peak
+    worst_error: float  # of the SED, relative to its peak
     setup_s: float
 
 

@@ -1,4 +1,4 @@
-"""The hard cases other than scenes: bodies, load paths and bad meshes, in one of the two kinematics."""
+"""The hard cases other than scenes: bodies, load paths and bad meshes, in either kinematics."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -36,12 +36,12 @@ class Bodies:
     fineness: float
     sense: int  # of the surface, in its first slide
     back_and_forth: tuple[float, int, int, float]  # bound [MPa], steps of the press and of a leg, and their length [mm]
-    path: Callable[[int], list[LoadState]]  # with first steps of this part of the way
+    path: Callable[[int], list[LoadState]]  # whose first steps are 1/count of the path
     path_words: str
     meshes: int  # number of distorted meshes
-    agreement: float  # relative, of states that must be the same
-    rigid_agreement: float  # of the forces of a stiff part and of a rigid one, where only round-off remains
-    node_agreement: float  # of one node's force and its compliance
+    agreement: float  # relative, of states that must be equal
+    rigid_agreement: float  # of the forces with a stiff part and with a rigid one, up to round-off
+    node_agreement: float  # of one node's force with its compliance
 
 
 def _linear(mesh: Mesh, layers: Sequence[tuple[float, float]]) -> Newton:
@@ -57,7 +57,7 @@ def _sed(finger: Finger, state: EquilibriumState) -> float:
 
 
 def _whole_path(count: int) -> list[LoadState]:
-    """Return a press of `count` even steps and a slide of as many, at least ten."""
+    """Return a press of `count` equal steps and a slide of as many, at least ten."""
     press = [LoadState(depth, 0.3, 0.01) for depth in np.linspace(0.0, _DEPTH, count + 1)[1:].tolist()]
     slide = [
         LoadState(_DEPTH, 0.3, 0.01, travel=-far) for far in np.linspace(0.0, 10.0, max(count, 10) + 1)[1:].tolist()
@@ -66,7 +66,7 @@ def _whole_path(count: int) -> list[LoadState]:
 
 
 def _beginning(count: int) -> list[LoadState]:
-    """Return a press and a slide with up to twenty first steps of 1/`count` of the way, then long ones."""
+    """Return a press and a slide, each with up to twenty first steps of 1/`count` of the path, then long ones."""
     down = [_DEPTH * (i + 1) / count for i in range(min(count, 20))]
     along = [8.0 * (i + 1) / count for i in range(min(count, 20))]
     down += [_DEPTH * part for part in (0.25, 0.5, 0.75, 1.0) if _DEPTH * part > down[-1]]
@@ -98,7 +98,7 @@ def _force(newton: Newton, depth: float, sense: int = -1) -> float:
 
 
 def reversal(bodies: Bodies) -> Outcome:
-    """Slide forth, back and forth again: full slip must recur, and occur in the other direction."""
+    """Slide forth, back and forth again: full slip must recur, and must occur in the other direction."""
     tau, press, leg, step = bodies.back_and_forth
     finger, load = bodies.finger(bodies.fineness), LoadState(_DEPTH, 0.44, tau)
     senses = [bodies.sense, -bodies.sense, bodies.sense]
@@ -114,7 +114,7 @@ def reversal(bodies: Bodies) -> Outcome:
 
 
 def steps(bodies: Bodies) -> Outcome:
-    """Press and slide in steps of 1 to 1/10,000 of the way: full slip does not depend on the load path."""
+    """Press and slide in steps of 1 to 1/10,000 of the path: full slip does not depend on the load path."""
     finger = bodies.finger(4.0)
     seds = [_sed(finger, _last(finger.newton, bodies.path(count))) for count in (1, 10, 100, 1000, 10000)]
     return agree(f"SED {seds[0]:.4g} after {bodies.path_words}", seds, bodies.agreement)
@@ -151,7 +151,7 @@ def distorted_finger(bodies: Bodies) -> Outcome:
 
 
 def stiff_part(bodies: Bodies, ratio: float) -> Outcome:
-    """Press a soft block by a plate in it that is `ratio` times stiffer, and by held nodes in place of the plate."""
+    """Press a soft block by an embedded plate that is `ratio` times stiffer, and by held nodes in its place."""
     whole, alone = two_parts()
     slide = solve_full_slip(bodies.newton(whole, [(0.034, 0.48), (0.034 * ratio, 0.3)]), LoadState(0.3, 0.3, sense=-1))
     force, rigid = float(slide.force[1]), _force(bodies.newton(alone, [(0.034, 0.48)]), 0.3)
@@ -162,7 +162,7 @@ def stiff_part(bodies: Bodies, ratio: float) -> Outcome:
 
 
 def one_node(bodies: Bodies) -> Outcome:
-    """Press so lightly that one node touches: at small strain its force is depth by compliance."""
+    """Press so lightly that one node touches: at small strain its force is the depth divided by its compliance."""
     mesh, layers = block(np.linspace(-4, 4, 17), np.linspace(0, 3, 7), radius=8.0), [(0.08, 0.48)]
     depth, mu = 1e-5, 0.3
     slide = solve_full_slip(bodies.newton(mesh, layers), LoadState(depth, mu, sense=-1))
@@ -176,7 +176,7 @@ def one_node(bodies: Bodies) -> Outcome:
 
 
 def aspect(bodies: Bodies) -> Outcome:
-    """Press a block of elements fifty times longer than high, and the same block of squarer ones."""
+    """Press a block of elements fifty times longer than high, and the same block of nearly square elements."""
     forces = [_force(bodies.newton(mesh, [(0.08, 0.48)]), 0.1) for mesh in slabs()]
     deviation = abs(forces[1] / forces[0] - 1)
     summary = f"N {forces[1]:.4g}, {percent(deviation)} from squarer elements'"

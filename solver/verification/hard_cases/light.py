@@ -10,8 +10,8 @@ from solver.response.solution import solve_many
 from solver.scene import Scene
 from solver.verification.hard_cases.outcome import Outcome, of_answer
 
-RESOLVABLE = 1e-3  # indentation with many elements in contact, which is still far smaller than the epidermis [mm]
-_MODEL = 0.005  # change of both laws by the rest of the finger, from there to lighter touches
+RESOLVABLE = 1e-3  # indentation with many elements in contact, but far smaller than the epidermis [mm]
+_MODEL = 0.005  # change of both laws by the rest of the finger, between this indentation and lighter touches
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +50,9 @@ def of_light_touch(scene: Scene) -> Outcome:
 def hertz(scene: Scene) -> Touch:
     """Return Hertz's values at the depth of a scene (Johnson 1985, eqs 4.43 to 4.45 and 5.56).
 
-    Half the contact is sqrt(4 N R / (pi E*)). As the force N on a mm of width falls, d / N grows by ln(1 / N) / (pi
-    E*). The finger behind the contact adds a constant to d / N, and the SED there by the force squared is another. Both
-    are from a deeper touch, which every mesh resolves.
+    The half-width is sqrt(4 N R / (pi E*)). As the force N per mm of width falls, d / N grows by ln(1 / N) / (pi E*).
+    The finger behind the contact adds a constant to d / N. The ratio of SED to force squared is another constant. Both
+    come from a deeper touch, which every mesh resolves.
     """
     from scipy.optimize import brentq  # slow to load, and only light touches use it
 
@@ -71,7 +71,7 @@ def hertz(scene: Scene) -> Touch:
 
 @cache
 def _finger(deeper: Scene) -> tuple[tuple[float, float], float]:
-    """Return depth [mm] and force [N/mm] of a touch, and its SED by the force squared [mm^2/(N^2) MPa]."""
+    """Return depth [mm] and force [N/mm] of a touch, and its SED over the force squared [mm^2/(N^2) MPa]."""
     (answer,) = solve_many([deeper])
     if isinstance(answer, SolveFailure):
         raise answer

@@ -13,7 +13,7 @@ from solver.scene import Scene
 
 BALANCE = ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance")  # audits of balance
 _LIMITS = ("penetration", "tension", "cone_violation")
-UNBALANCED, EXCEEDED = 1e-4, 1e-7  # largest residual, by the forces; largest excess over a law, by its limit
+UNBALANCED, EXCEEDED = 1e-4, 1e-7  # largest residual relative to the forces; largest excess relative to a law's limit
 _NOTHING = 1.0  # estimated error of an answer without any accuracy
 
 
@@ -28,7 +28,7 @@ class Outcome:
 
 
 def of_scene(scene: Scene) -> Outcome:
-    """Solve a scene of the finger by the public face."""
+    """Solve a scene of the finger by the public interface."""
     return of_answer(solve_many([scene])[0])
 
 

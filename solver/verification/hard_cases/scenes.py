@@ -35,7 +35,7 @@ class Case:
 
 
 def hard_scenes(kinematics: Kinematics) -> Iterator[Case]:
-    """Yield the scenes of the suite in one of the two kinematics."""
+    """Yield the scenes of the suite in one kinematics."""
     make = partial(_scene, kinematics)
     history = Solve(kinematics, "history")
     yield from _tissues(make)

@@ -41,7 +41,7 @@ class HardCase:
 
 
 def cases(kinematics: Kinematics) -> tuple[Case, ...]:
-    """Return the suite in one of the two kinematics."""
+    """Return the suite in one kinematics."""
     on_bodies = bodies.BODIES[kinematics]
     of_bodies = (
         Case(kinematics, name, ANSWER, partial(run, on_bodies), slow=run is bodies.steps)
@@ -67,7 +67,7 @@ def judge(case: Case, neighbour: Outcome | None = None) -> HardCase:
 
 
 def measure(request: Request) -> Iterator[HardCase | LeftOut]:
-    """Yield a row for every case; in a quick run for the most telling ones."""
+    """Yield a row for every case; in a quick run only for the most informative ones."""
     suite = {(case.kinematics, case.name): case for kinematics in bodies.BODIES for case in cases(kinematics)}
     todo = [case for case in suite.values() if not request.quick or case.name in TELLING]
     if len(todo) < len(suite):

@@ -17,7 +17,7 @@ _NONE: Indices = np.zeros(0, np.int64)
 
 
 def grade(finest: float, growth: float, zone: float, end: float) -> Array:
-    """Return lines from 0 to `end`, `finest` apart up to `zone` and then with growing distances."""
+    """Return lines from 0 to `end`, `finest` apart up to `zone` and increasingly far apart beyond."""
     steps = [0.0]
     while steps[-1] < end:
         steps.append(steps[-1] + max(finest, finest + growth * (steps[-1] - zone)))
@@ -92,10 +92,10 @@ def mound(x_lines: Array, y_lines: Array, radius: float, zone: float) -> Mesh:
 
 
 def disc(radius: float, finest: float, zone: float) -> Mesh:
-    """Return a whole cylinder that stands on the surface, fine below and above; its skin is the lower quarter."""
+    """Return a whole cylinder on the surface, with a fine mesh below and above; its skin is the lower quarter."""
     fine = mirror(grade(finest, 0.3, zone, radius * np.pi / 4)) / radius  # angles from the lowest point
     coarse = np.linspace(-np.pi / 4, np.pi / 4, 13)
-    out = 1 - grade(finest, 0.3, 0.0, 0.45 * radius)[::-1] / radius  # radii by the outer one
+    out = 1 - grade(finest, 0.3, 0.0, 0.45 * radius)[::-1] / radius  # radii relative to the outer one
     half = 0.4 * radius
 
     def quarter(angles: Array, turn: float) -> Array:
@@ -129,8 +129,8 @@ def _clockwise(grid: Array) -> bool:
 def distort(mesh: Mesh, by: float, seed: int, still: Indices | None = None) -> Mesh:
     """Return the mesh with inner corners of elements moved at random by up to `by` of their shortest edge.
 
-    Corners on the boundary, between layers, held, on the skin or in `still` stay, so that the body is the same. Other
-    nodes follow. Corners that would fold an element move less.
+    Corners on the boundary, between layers, held, on the skin or in `still` stay, so that the body does not change.
+    Other nodes follow the corners. Corners that would fold an element move less.
     """
     corners, middles = mesh.elements[:, :4], mesh.elements[:, 4:8]
     sides = np.stack([corners, np.roll(corners, -1, axis=1)])  # two ends of every side
@@ -187,12 +187,12 @@ def stress_at(body: LinearBody, displacement: Array, element: Indices, local: Ar
 
 
 def touching_within(newton: Newton, half_width: float) -> Indices:
-    """Return initial states: nodes with |x| below `half_width` slip, the others are open."""
+    """Return initial states: nodes with |x| below `half_width` slip, all others are open."""
     return np.where(np.abs(newton.skin_x) < half_width, SLIP, OPEN)
 
 
 def half_width(x: Array, force: Array, inside: NDArray[np.bool_]) -> float:
-    """Return the half-width of the zone of nodes `inside` (k,), at whose ends a `force` (k,) falls like a pressure.
+    """Return the half-width of the zone of nodes `inside` (k,), at whose ends `force` (k,) falls like a contact force.
 
     Returns nan where the zone is too short.
     """

@@ -1,7 +1,7 @@
 """Cylinders on a flat rigid surface: Hertz, Smith and Liu, Cattaneo and Mindlin, Coulomb with a bound.
 
-K. L. Johnson, Contact Mechanics, Cambridge 1985, chapters 4, 5 and 7. Half-plane problems run in units of the
-half-width a, on a block so wide that its sides have no effect; whole cylinders have their own lengths.
+K. L. Johnson, Contact Mechanics, Cambridge 1985, chapters 4, 5 and 7. Half-plane problems are in units of the
+half-width a, on a block so wide that its sides have no effect; whole cylinders are in mm.
 """
 
 from dataclasses import dataclass, replace
@@ -33,7 +33,7 @@ from solver.verification.published.bodies import (
 ELEMENT: dict[Kinematics, float] = {"small": 1 / 30, "finite": 1 / 10}  # of the half-width
 _WIDE: dict[Kinematics, float] = {"small": 100.0, "finite": 30.0}  # of the block to each side, in half-widths
 RADIUS = 1000.0  # in half-widths: the theory's limit of light loads
-DEPTH = 2.3e-3  # of the light contact at finite strain, whose half-width is then 1.1
+DEPTH = 2.3e-3  # of the light contact at finite strain, which gives a half-width of 1.1
 _YOUNG = 0.08  # [MPa]
 _NONE = LoadState(0.0, 0.0, sense=-1)
 
@@ -45,7 +45,7 @@ def _half_plane(finest: float, wide: float, radius: float, unit: float = 1.0) ->
 
 
 def press(finest: float, nu: float) -> float:
-    """Return the force [N/mm] on a half-plane with elements of size `finest`, pressed lightly, by 1e-3 half-widths."""
+    """Return the force [N/mm] on a half-plane with elements of size `finest`, lightly pressed by 1e-3 half-widths."""
     body = LinearBody.of(_half_plane(finest, 20.0, RADIUS), [Hooke(_YOUNG, nu)])
     return float(solve_full_slip(Newton(body.condensed), _NONE._replace(depth=1e-3)).force[1])
 
@@ -58,7 +58,7 @@ class Hertz:
     half_width: float  # from the pressure's second moment, a = 2 sqrt(<x^2>) [mm]
     half_extent: float  # half the distance from the first to the last touching node [mm]
     peak: float  # pressure in the middle [MPa]
-    worst: float  # largest difference of the pressure from the ellipse inside 0.9 a, by the peak
+    worst: float  # largest difference of the pressure from the ellipse inside 0.9 a, relative to the peak
     approach: float = 0.0  # of the plate to the cylinder's centre [mm]
 
 
@@ -107,9 +107,9 @@ class LightContact:
     newton: Newton
     press: EquilibriumState
     load: float  # [N/mm]
-    half_width: float  # by theory under this load
+    half_width: float  # from theory, under this load
     x: Array  # (k,) of the undeformed skin's nodes
-    length: Array  # (k,) of the skin that belongs to them: 1/6, 4/6, 1/6 of an edge
+    length: Array  # (k,) tributary lengths of these nodes: 1/6, 4/6, 1/6 of an edge
 
     @property
     def peak(self) -> float:
@@ -125,13 +125,13 @@ class LightContact:
         return 2 * float(np.sqrt(state.normal @ self.x**2 / state.normal.sum()))
 
     def stress(self, state: EquilibriumState, points: Array) -> Array:
-        """Return the stress (p, 2, 2) at `points` (p, 2), by the peak pressure, at small strain."""
+        """Return the stress (p, 2, 2) at `points` (p, 2), relative to the peak pressure, at small strain."""
         if not isinstance(self.body, LinearBody):
             raise TypeError("stresses are compared at small strain")
         return stress(self.body, self.body.displacement(state.u), points) / self.peak
 
     def shear(self, mu: float, part: float) -> EquilibriumState:
-        """Return the state after a tangential force `part` mu P along -x on the far side of the pressed state."""
+        """Return the state after a tangential force `part` mu P along -x is applied to the pressed state."""
         sticks = np.where(self.press.touching, STICK, OPEN).astype(np.int32)
         before = replace(self.press, state=sticks, load=LoadState(self.press.load.depth, mu))
         return solve_under_forces(self.newton, before, ForceLoad(self.load, -part * mu * self.load))
@@ -142,18 +142,18 @@ class LightContact:
         return solve_full_slip(self.newton, load, tolerance=1e-13)
 
     def stick_width(self, state: EquilibriumState, mu: float) -> float:
-        """Return half the width of the stick zone by a; at its ends mu p - q falls to zero."""
+        """Return half the width of the stick zone relative to a; at its ends mu p - q falls to zero."""
         spare = mu * state.normal - np.abs(state.tangential)
         return half_width(self.x, spare, state.state == STICK) / self.half_width
 
     def capped_width(self, state: EquilibriumState, law: FrictionLaw) -> float:
-        """Return half the width of the zone at the traction bound by a; at its ends mu p crosses the bound."""
+        """Return half the width of the zone at the traction bound relative to a; at its ends mu p crosses the bound."""
         return half_above(self.x, law.mu * state.normal / self.length - law.tau_max) / self.half_width
 
 
 @cache
 def light(kinematics: Kinematics = "small", nu: float = 0.4999, wide: float | None = None) -> LightContact:
-    """Return the light contact; `wide` half-widths of body to each side."""
+    """Return the light contact; the body extends by `wide` half-widths to each side."""
     mesh = _half_plane(ELEMENT[kinematics], wide or _WIDE[kinematics], RADIUS)
     x, plane = mesh.nodes[mesh.skin, 0], _YOUNG / (1 - nu**2)
     if kinematics == "small":

@@ -39,7 +39,7 @@ def _widen(mesh: Mesh, hole: Indices, nu: float) -> tuple[LinearBody, Array, Arr
 def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
     """Return the errors of displacement, stress (both root mean squares) and energy on distorted elements.
 
-    They are by the hole's widening, the inner pressure and the energy. The closed form of the stress is
+    They are relative to the hole's widening, the inner pressure and the energy. The closed form of the stress is
     A (1 - b^2/r^2) along the radius and A (1 + b^2/r^2) across it, with A = p a^2/(b^2 - a^2).
     """
     mesh, hole = ring(INNER, OUTER, radial, 4 * radial)
@@ -72,7 +72,7 @@ def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
 def cook(young: float, nu: float, force: float, count: int) -> tuple[float, float]:
     """Return the rise of the right edge of Cook's membrane at its middle and upper end [mm].
 
-    `force` [N/mm] is spread evenly over the right edge, `count` elements lie along each side.
+    `force` [N/mm] is distributed evenly over the right edge, and each side has `count` elements.
     """
     mesh = membrane(count, count)
     loads = edge_load(mesh, mesh.skin, np.tile([0.0, force / 16.0], (len(mesh.skin), 1)))

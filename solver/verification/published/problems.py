@@ -1,4 +1,4 @@
-"""The published problems as rows: source, expected number, obtained number, allowed error."""
+"""The published problems as rows: source, expected value, obtained value, allowed error."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -15,7 +15,7 @@ from solver.verification.request import LeftOut, Request, clock, rows_within
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One number of one problem; `off` and `allowed` are relative to the expected number, or to what `of` names."""
+    """One result of one problem; `off` and `allowed` are relative to the expected value, or to the value named `of`."""
 
     problem: str
     source: str
@@ -29,7 +29,7 @@ class Problem:
 
     @property
     def agrees(self) -> bool:
-        """Whether the obtained number is close enough."""
+        """Whether the obtained value is within the allowed error."""
         return self.off <= self.allowed
 
 
@@ -44,14 +44,14 @@ HERTZ_PROBLEMS = (
 JOHNSON, KONTER = "Johnson 1985, ch. 4", "Konter 2005, FENET-UNOTT-DLE-09"
 MINDLIN = "Cattaneo 1938, Mindlin 1949"
 # E, nu, F, and u_y at the right edge's middle and upper end; plane stress as the equivalent plane strain. Published
-# numbers have too few digits for our tolerance: these are from another code's meshes up to 128 x 128
+# values have too few digits for the tolerance: these come from another code's meshes up to 128 x 128
 _REFINED = "another code, 128 x 128"
 COOK = (
     ("Cook's membrane, plane stress", f"{_REFINED}; 23.96 in Cook 1989", 0.9375, 0.25, 1.0, 23.967, 25.18),
     ("Cook's membrane, nu 0.4999", f"{_REFINED}; 7.7 and 8.1 published", 240.565, 0.4999, 100.0, 7.693, 8.072),
     ("Cook's membrane, nu 0.499999975", f"{_REFINED}; 16.442 published", 1.12499998, 0.499999975, 1.0, 16.447, None),
 )
-# x, z, sigma_x, sigma_z, tau_xz by p0 in units of a (quadrature of the Flamant kernels)
+# x and z relative to a; sigma_x, sigma_z, tau_xz relative to p0 (quadrature of the Flamant kernels)
 BELOW = {
     0.0: (
         (0.0, 0.25, -0.59141, -0.97014, 0.0),
@@ -77,7 +77,7 @@ SECOND_MOMENT = "half-width a, from <x^2> of the pressure [mm]"
 
 
 def measure(request: Request) -> Iterator[Problem | LeftOut]:
-    """Return an iterator over all numbers, until the time is up."""
+    """Return an iterator over all results, until the time is up."""
     works = [
         thick_cylinders, membranes, hertz, partial_slip, bound_on_hertz, cylinder, below,
         light_finite, partial(bound_on_hertz, "finite"), partial(partial_slip, "finite"),
@@ -86,7 +86,7 @@ def measure(request: Request) -> Iterator[Problem | LeftOut]:
 
 
 def _timed(rows: Iterable[Problem]) -> Iterator[Problem]:
-    """Yield the rows, each with the time that it took; a further number of one solve takes none."""
+    """Yield the rows, each with its time; further results of one solve take none."""
     start = clock()
     for row in rows:
         yield replace(row, took_s=clock() - start)
@@ -132,7 +132,7 @@ def cylinder() -> Iterator[Problem]:
 
 
 def below() -> Iterator[Problem]:
-    """Yield the largest difference of stresses below a contact, by p0, with and without friction."""
+    """Yield the largest difference of stresses below a contact, relative to p0, with and without friction."""
     for mu, table in BELOW.items():
         light, rows = contacts.light(wide=300.0), np.array(table)
         stresses = light.stress(light.slip(FrictionLaw(mu, math.inf), -1), rows[:, :2])
@@ -144,7 +144,7 @@ def below() -> Iterator[Problem]:
 
 
 def light_finite() -> Iterator[Problem]:
-    """Yield half-width and peak of a contact at finite strain, so light that small-strain theory holds."""
+    """Yield half-width and peak of a contact at finite strain, so light that small-strain theory applies."""
     light = contacts.light("finite")
     problem, width = "Hertz at finite strain, a/R 0.001", light.width(light.press) / light.half_width
     yield _row(problem, JOHNSON, "half-width a, by a", 1.0, width, 0.003)
@@ -152,7 +152,7 @@ def light_finite() -> Iterator[Problem]:
 
 
 def partial_slip(kinematics: Kinematics = "small") -> Iterator[Problem]:
-    """Yield half the width of the stick zone and the traction in its middle, under the pressure of nu = 0.4999."""
+    """Yield half the width of the stick zone and the traction at its middle, for nu = 0.4999."""
     light, mu = contacts.light(kinematics), 0.3
     for part in TANGENTIAL_LOADS[kinematics]:
         state = light.shear(mu, part)
@@ -163,7 +163,7 @@ def partial_slip(kinematics: Kinematics = "small") -> Iterator[Problem]:
 
 
 def bound_on_hertz(kinematics: Kinematics = "small") -> Iterator[Problem]:
-    """Yield the drag of a traction bound on a Hertz pressure, and half the width where it acts, if anywhere."""
+    """Yield the drag of a traction bound on a Hertz pressure, and half the width of its zone, if it has one."""
     light, mu, source = contacts.light(kinematics), 0.3, "elementary integral"
     for k, force in CAPPED:
         law = FrictionLaw(mu, k * mu * light.peak)

@@ -1,7 +1,7 @@
 """Compare error estimates with true errors on many random scenes: `python -m solver.verification.survey`.
 
-Each scene is solved at 1 % and at 0.3 %. One takes 1 to 60 s. `--keep FILE` appends new rows to
-FILE and reads the rows that it holds already.
+Each scene is solved at 1 % and at 0.3 %, in 1 to 60 s. `--keep FILE` reads the rows that FILE
+contains, and appends new ones.
 """
 
 from argparse import ArgumentParser
@@ -31,7 +31,7 @@ def read_rows(keep: Path | None) -> list[Row]:
 
 
 def rows(keys: Sequence[Key], keep: Path | None, solve: Callable[[str, int, Kinematics], Row] = solve) -> Iterator[Row]:
-    """Yield the rows of scenes, from the file `keep` where it has them; solve the others and append them."""
+    """Yield the rows of scenes from the file `keep`; solve scenes that it lacks and append their rows."""
     by_key = {(row.family, row.number, row.kinematics): row for row in read_rows(keep)}
     for key in keys:
         row = by_key.get(key)

@@ -19,7 +19,7 @@ from solver.verification.survey.statistics import HEADER, TOLERANCES, judgement,
 from solver.verification.truth import TRUE_NUMBERS, mean_and_doubt
 
 SURFACE_SET = "surfaces"  # the set of three surfaces solved together, whose differences are relative to their range
-BY_TOLERANCE = 5.0  # tolerance of a difference by that of a number
+BY_TOLERANCE = 5.0  # ratio of the tolerance of a difference to that of a scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ def _with_tolerance(scene: Scene, tolerance: float, *, together: bool) -> Scene:
 
 
 def _difference(answers: Sequence[Prediction], tolerance: float, solves: Array) -> Estimate:
-    """Return estimate and error of a difference in SED, by the range of the truth, `solves` (3, n, 3)."""
+    """Return estimate and error of differences in SED, relative to the range of the truth `solves` (3, n, 3)."""
     sed = np.array([answer.sed_ending for answer in answers])
     error, doubt = apart(sed, solves[:, :, 0])
     first = answers[0]
@@ -72,9 +72,9 @@ def _difference(answers: Sequence[Prediction], tolerance: float, solves: Array) 
 
 
 def apart(numbers: Array, solves: Array) -> tuple[float, float]:
-    """Return the worst error of a difference between `numbers` (n,), and the truth's doubt, by the range of the truth.
+    """Return the worst error of a difference between `numbers` (n,), and the truth's doubt, both relative to its range.
 
-    `solves` (m, n) are the numbers on m fine meshes.
+    `solves` (m, n) are the values on m fine meshes, whose mean is the truth.
     """
     truth = solves.mean(axis=0)
     span = float(np.ptp(truth))

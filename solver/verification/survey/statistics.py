@@ -7,8 +7,8 @@ from scipy.stats import spearmanr
 
 from solver.verification.estimates import GOALS, Estimate
 
-TOLERANCES = (0.01, 0.003)  # of answers; the second is the usual one
-EXACT = 1e-12  # error below which a number follows from the input alone, and is not judged [-]
+TOLERANCES = (0.01, 0.003)  # of answers; the second is the default
+EXACT = 1e-12  # error below which a result follows from the input alone, and is not judged [-]
 HEADER = (
     "set", "strain", "answers", "SED above", "corrected above", "force above", "drag above", "near", "missed unsaid",
     "ratio", "corrected ratio", "rank", "sign", "corrected",
@@ -18,8 +18,8 @@ HEADER = (
 def judgement(name: str, kinematics: str, rows: Iterable[Estimate]) -> tuple[str, ...]:
     """Return the cells under `HEADER` of one set of scenes.
 
-    Near, ratio (estimate by error, median), rank (Spearman's, of estimate and error), sign (whether the nested value
-    lies on the truth's side) and corrected (its error by the answer's, median) are those of the SED.
+    Near, ratio (median of estimate over error), rank (Spearman's, of estimate and error), sign (whether the nested
+    value lies on the truth's side) and corrected (median of its error over the answer's) are those of the SED.
     """
     decidable = [row for row in rows if row.above is not None and row.error > EXACT]
     by_number = [[row for row in decidable if row.number == number] for number in GOALS]
@@ -51,7 +51,7 @@ def _share(verdicts: Sequence[bool]) -> str:
 
 
 def misses(rows: Iterable[Estimate]) -> Iterator[str]:
-    """Yield a line for every number whose error exceeds its estimate."""
+    """Yield a line for every result whose error exceeds its estimate."""
     for row in rows:
         if row.above is False and row.error > EXACT:
             sentence = f"error of the {row.number} {row.error:.2g}, estimate {row.estimate:.2g}"
