@@ -108,10 +108,10 @@ class Console:
             if line is not None:
                 self._print_error(harmless(line))
 
-    def lose(self, reason: object) -> None:
-        """Print why a result, which may still be printed, is not kept; the exit code is then that of flaws."""
+    def lose(self, sentence: str) -> None:
+        """Print that a result or a setting is lost; the exit code is then that of flaws."""
         self._lost_results = True
-        self.note(f"not kept: {reason}")
+        self.note(sentence)
 
     def exit_code(self, code: int) -> int:
         """Return the exit code of a verb that ended with `code`."""
@@ -230,9 +230,9 @@ def point_advice(text: str) -> str:
     """Return advice to add to an error message where somebody typed a decimal comma, else an empty text.
 
     >>> point_advice("'1,5'"), point_advice("1.5"), point_advice("1,5,2")
-    (', its fraction behind a point', '', '')
+    (', with a decimal point', '', '')
     """
-    return ", its fraction behind a point" if re.fullmatch(r"'?[+-]?\d*,\d+'?", text.strip()) else ""
+    return ", with a decimal point" if re.fullmatch(r"'?[+-]?\d*,\d+'?", text.strip()) else ""
 
 
 class _Help(argparse.HelpFormatter):

@@ -160,7 +160,7 @@ def _estimate_panel(rows: Sequence[Estimate]) -> style.Panel:
     _strain_legend(axes, _by_strain(rows), "lower right")
     number = rows[0].number
     axes.set(xlabel="true error [%]", ylabel="estimated error [%]", title=number)
-    header = ("kinematics", "case", "tolerance", "unknowns", "estimate [-]", "true error [-]", "doubt of the truth [-]")
+    header = ("kinematics", "case", "tolerance", "unknowns", "estimate [-]", "true error [-]", "its uncertainty [-]")
     columns = ("kinematics", "case", "tolerance", "dofs", "estimate", "error", "doubt")
     table = [tuple(getattr(row, name) for name in columns) for row in rows]
     name = "estimate-" + number.split()[0].lower()
@@ -217,19 +217,19 @@ CAPTIONS = {
     "speed":
         f"Time against true error: largest error of the SED on {len(JUDGED)} surfaces (slipperiness 0 to 100, "
         "stickiness 0), median time of a solve, mesh and estimate not included. One point a mesh; hollow where the "
-        "error is below three times the doubt of the truth. Last, surfaces solved together to a tolerance, every mesh "
-        "and estimate included: filled by the largest estimate, hollow by the largest true error.",
+        "error is below three times the uncertainty of the reference. Last, surfaces solved together to a tolerance, "
+        "every mesh and estimate included: filled by the largest estimate, hollow by the largest true error.",
     "benchmarks":
         "Time against true error on problems with a known answer, mesh included: thick cylinder, Cook's membrane, "
         "half-plane under a round body, and the finger at its ending. The table of orders names every point.",
     "estimates":
-        "Estimated against true error, of every answer that was asked for with a tolerance. Above the line the "
-        "estimate is safe; below the dashed line (ten times the larger of true error and 0.02 %) it is near. Hollow: "
-        "the truth is too doubtful to tell.",
+        "Estimated against true error, of every answer at a requested tolerance. Above the line the estimate is "
+        "safe; below the dashed line (ten times the larger of true error and 0.02 %) it is near. Hollow: the reference "
+        "is not accurate enough to decide.",
     "orders":
         "Errors of sequences of meshes against the size of their elements; the slope is the order of convergence, "
         "which the table gives. Where contact is involved, the root mean square over meshes of nearly one size.",
-    "costs": "Where the time of one solve through the front door goes, mesh and error estimate included.",
+    "costs": "Time of the parts of one solve through the public interface, mesh and error estimate included.",
     "growth":
         "Time of one assembly, factorisation and solve against the number of unknowns; the exponent is that of the "
         f"meshes from {FEWEST:,} unknowns on. Grey: the power 1.5.",

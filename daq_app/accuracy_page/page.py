@@ -109,8 +109,9 @@ def _estimates(results: RunResults) -> Table:
             above, near = _share([row.above for row in group]), _share([row.near for row in group])
             cells.append((f"{kinematics} strain", name, str(len(group)), above, near, met, ratio))
     caption = (
-        "Estimates against true errors, of answers asked for with a tolerance. Above: the estimate is at least the "
-        "true error. Near: below ten times the larger of true error and 0.02 %. Counted only where the truth can tell."
+        "Estimates against true errors, of answers at a requested tolerance. Above: the estimate is at least the true "
+        "error. Near: below ten times the larger of true error and 0.02 %. Counted only where the reference is "
+        "accurate enough."
     )
     header = ("", "number", "answers", "above", "near", "tolerance met", "estimate by error, median")
     return Table("estimates", caption, header, tuple(cells))
@@ -124,10 +125,10 @@ def _share(answers: Sequence[bool | None]) -> str:
 def _hard(results: RunResults, kinematics: str) -> Table:
     rows = [row for row in results.of(HardCase) if row.kinematics == kinematics]
     count = sum(not row.flaw for row in rows)
-    caption = f"Hard cases at {kinematics} strain: {count} of {len(rows)} ended as they must."
+    caption = f"Hard cases at {kinematics} strain: {count} of {len(rows)} ended as expected."
     outcomes = [f"FAILED, {row.flaw}: {row.summary}" if row.flaw else row.summary for row in rows]
     cells = tuple((row.case, row.must, outcome) for row, outcome in zip(rows, outcomes, strict=True))
-    return Table(f"hard-{kinematics}", caption, ("case", "must", "outcome"), cells)
+    return Table(f"hard-{kinematics}", caption, ("case", "expected", "outcome"), cells)
 
 
 def _ms(seconds: float | None) -> str:
@@ -158,14 +159,14 @@ _TABLES: tuple[Callable[[RunResults], Table], ...] = (
     ),
     _table_maker(
         "truths", Truth,
-        "The reference cases and their truth: mean of three overkill solves on meshes that differ, made "
-        "in this run. Doubt: how far they lie from it at most.",
+        "The reference cases and their true values: mean of three overkill solves on different meshes, computed "
+        "in this run. Uncertainty: their greatest deviation from the mean.",
         {
             "strain": lambda row: row.kinematics, "case": lambda row: row.case,
             "SED [MPa]": lambda row: _value(row, 0), "N [N/mm]": lambda row: _value(row, 1),
             "drag [N/mm]": lambda row: _value(row, 2),
-            "doubt": lambda row: percent(max(row.doubt)) if row.numbers else "–",
-            "unknowns, or why there is none":
+            "uncertainty": lambda row: percent(max(row.doubt)) if row.numbers else "–",
+            "unknowns, or why there is no value":
                 lambda row: " / ".join(f"{n:,}" for n in row.dofs) if row.numbers else row.refused,
         },
     ),
@@ -205,9 +206,8 @@ _TABLES: tuple[Callable[[RunResults], Table], ...] = (
     ),
     _table_maker(
         "costs", Cost,
-        "Where the time of one surface goes, asked for with a tolerance: in all, from scene to answer. Set-up, solve "
-        "and estimate are of the mesh that the answer is from, as it states itself; parts: shares of all, by a "
-        "profiler.",
+        "Time for one surface at a requested tolerance: in all, from scene to answer. Set-up, solve and estimate are "
+        "of the answer's mesh, as the answer states them; parts: shares of all, by a profiler.",
         {
             "": lambda row: f"{row.kinematics} strain", "tolerance": lambda row: percent(row.tolerance),
             "unknowns": lambda row: f"{row.dofs:,}", "in all [ms]": lambda row: _ms(row.took_s),

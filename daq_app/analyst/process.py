@@ -99,7 +99,7 @@ class Analyst:
             except (EOFError, OSError):
                 self.close()
                 if not messages or not isinstance(messages[-1], m.Problem):
-                    sentence = tr("The work has stopped without a word; what is asked next begins it anew.")
+                    sentence = tr("The work ended unexpectedly; the next request restarts it.")
                     messages.append(m.Problem(sentence))
         if any(isinstance(message_, m.Cancelled) for message_ in messages):
             self._stop_time = None

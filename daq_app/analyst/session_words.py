@@ -51,7 +51,7 @@ def marks_of(row: Row) -> str:
     """Return the meaning of a line's marks, for tool tips and screen readers."""
     stroke, failed = row.stroke, row.prediction is not None and row.prediction.sed is None
     flaws = tr("! has flaws: ") + _flaws(stroke) if stroke is not None and stroke.flaws else ""
-    decision = tr("✎ somebody decided something about it") if stroke is not None and stroke.decided else ""
+    decision = tr("✎ has a decision") if stroke is not None and stroke.decided else ""
     return "; ".join(filter(None, (flaws, decision, tr("✗ the model has no SED for it") if failed else "")))
 
 

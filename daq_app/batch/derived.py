@@ -144,7 +144,7 @@ def _read_or_empty(recording: Recording, name: str, console: Console | None = No
         return stored_document(recording.folder, name) or {}
     except RecordingError as damaged:
         if console is not None:
-            console.lose(f"{damaged}; the {_SETTINGS[name]} are the usual ones now")
+            console.lose(f"{damaged}; the {_SETTINGS[name]} are now the default ones")
         return {}
 
 
@@ -165,7 +165,7 @@ def predict_session(
     document = _with_firing(prediction, afferent or _afferent_of(previous))
     lost = _dropped_parts(previous, prediction.options)
     if _keep(console, store_derived, recording.folder, PREDICTION, document) and lost:
-        console.note(f"{PREDICTION} held more before, which is not kept: {', '.join(lost)}")
+        console.note(f"{PREDICTION} no longer holds: {', '.join(lost)}")
     return prediction
 
 
@@ -292,6 +292,6 @@ def _keep(console: Console, store: Callable[..., object], *facts: object) -> boo
     try:
         store(*facts)
     except RecordingError as error:
-        console.lose(error)
+        console.lose(f"not saved: {error}")
         return False
     return True

@@ -32,7 +32,7 @@ from sessions.strokes.decisions import DECISIONS
 _LOOK = 0.1  # between two polls for finished work [s]
 WITHOUT_WORKERS = 30.0  # longest time of a cluster without workers [s]
 _ANSWERS = 20.0  # longest time for a scheduler to answer [s]
-AGAIN = "run this again once it is there: what is done is kept"
+AGAIN = "run this again once it is there: finished results are kept"
 NUMBERS_BY = ("daq-app", "numpy", "scipy", "numba")  # other versions of these may give other numbers
 # All files that a visit's numbers depend on.
 CONTENT = (LIVE_FILE, f"{LIVE_FILE}-wal", UNBLINDING, SEAL, DECISIONS, GAIN_ERROR)
@@ -129,7 +129,7 @@ def by_cluster(
             if time.monotonic() - last_worker_time > WITHOUT_WORKERS:
                 raise SchedulerError(
                     f"{address}: the scheduler has had no worker for {WITHOUT_WORKERS:.0f} s; start some and run this "
-                    "again: what is done is kept"
+                    "again: finished results are kept"
                 )
             # Files are read and sent as workers become free, so that memory never holds those of all sessions.
             while queue and threads and len(under_way) < 2 * threads:
@@ -159,7 +159,7 @@ def refuse_other_workers(client: Any, workers: Sequence[str], address: str) -> N
         if isinstance(versions, ImportError):
             raise SchedulerError(
                 f"{address}: the worker {worker} has no daq-app ({versions}); install it there, in the version that "
-                "is here, and run this again: what is done is kept"
+                "is here, and run this again: finished results are kept"
             )
         if isinstance(versions, dict):
             refuse_unlike(cast("dict[str, str]", versions), address, f"the worker {worker}")
@@ -173,7 +173,7 @@ def refuse_unlike(versions: Mapping[str, Any], address: str, worker_name: str) -
         unlike = ", ".join(f"{name} {versions.get(name)} (here {present.get(name)})" for name in differ)
         raise SchedulerError(
             f"{address}: {worker_name} computes with {unlike}; give every worker the versions that are here and "
-            "run this again: what is done is kept"
+            "run this again: finished results are kept"
         )
 
 
@@ -231,7 +231,7 @@ class Shelf:
         except OSError as error:
             refusal = f"{self._folder} cannot be written ({error.strerror}): {remedy(error, new=True)}"
             raise RecordingError(
-                f"{refusal}, or give another by --out, and run this again: what is done is kept"
+                f"{refusal}, or give another by --out, and run this again: finished results are kept"
             ) from error
 
 

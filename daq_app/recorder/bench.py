@@ -124,7 +124,7 @@ class Bench:
                 self.connect(former)
                 outcome = "is connected again"
             except _FAILURES as failure:
-                outcome = f"was let go of and does not come back: {failure}"
+                outcome = f"was disconnected and cannot be connected again: {failure}"
             raise type(error)(f"{error}; {former} {outcome}") from None
 
     def disconnect(self) -> None:

@@ -150,7 +150,7 @@ class Dialogue:
             self._open_keys.add(key)
             return event
         self._send(Stored(key))
-        return Note(f"The tablet gave an answer that was no longer asked for ({key}): {structs.astuple(event)[0]}")
+        return Note(f"The tablet answered a question that was no longer open ({key}): {structs.astuple(event)[0]}")
 
     def _acknowledge(self, key: str) -> bool:
         """Confirm to the tablet an answer that is stored; return whether it is."""

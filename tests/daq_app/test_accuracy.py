@@ -336,7 +336,7 @@ def test_growth_is_the_power_of_the_unknowns():
 
 def test_a_table_stands_in_the_docs_as_markdown_whatever_its_cells_hold(example):
     lines = tables(example)["hard-finite"].markdown().splitlines()
-    assert lines[0] == "| case | must | outcome |"
+    assert lines[0] == "| case | expected | outcome |"
     assert lines[2] == "| mu 9 | answer | FAILED, no answer: No <state> & no \\| answer. |"
 
 

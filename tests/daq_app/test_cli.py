@@ -119,9 +119,9 @@ def test_a_wrong_command_line_is_one_sentence_and_exit_code_2(arguments, capsys)
         (["solve", "a", "--row", "deep"], "--row 'deep' is not allowed: it must be a number; 'daq-app solve --help'"),
         (["decide", "a", "--drop", "--trial", "1.5"], "--trial '1.5' is not allowed: it must be a whole number;"),
         (["simulate", "net-ft", "--factor", "-inf"], "--factor -inf is not allowed: 0.01 to 1000"),
-        (["simulate", "net-ft", "--factor", "1,5"], "'1,5' is not allowed: 0.01 to 1000, its fraction behind a point"),
-        (["solve", "a", "--row", "0,5"], "'0,5' is not allowed: it must be a number, its fraction behind a point;"),
-        (["study", "--power", "effect=2,5"], "NAME=VALUE, such as effect=20, its fraction behind a point"),
+        (["simulate", "net-ft", "--factor", "1,5"], "'1,5' is not allowed: 0.01 to 1000, with a decimal point"),
+        (["solve", "a", "--row", "0,5"], "'0,5' is not allowed: it must be a number, with a decimal point;"),
+        (["study", "--power", "effect=2,5"], "NAME=VALUE, such as effect=20, with a decimal point"),
     ],
 )
 def test_what_is_no_number_is_refused_with_what_is_allowed(arguments, words, capsys):

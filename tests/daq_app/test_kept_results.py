@@ -34,7 +34,7 @@ def test_a_damaged_analysis_is_made_anew_and_the_loss_of_what_was_set_in_it_is_n
     assert run([verb, str(small)]) == 3
     error = capsys.readouterr().err
     assert "analysis.json is damaged" in error
-    assert "the law of the contact area and seed of the intervals are the usual ones now" in error
+    assert "the law of the contact area and seed of the intervals are now the default ones" in error
     assert json.loads((small / "analysis.json").read_bytes())["settings"]["area"]["law"] == "fixed"
     assert run([verb, str(small)]) == 0
 
@@ -44,7 +44,7 @@ def test_a_damaged_prediction_is_made_anew_and_the_loss_of_what_was_set_in_it_is
     assert run(["predict", str(small)]) == 3
     error = capsys.readouterr().err
     assert "prediction.json is damaged" in error
-    assert "the options and afferent of the prediction are the usual ones now" in error
+    assert "the options and afferent of the prediction are now the default ones" in error
 
 
 def test_a_prediction_is_not_made_anew_where_a_sealed_one_forbids_the_seal(small, capsys):
@@ -80,7 +80,7 @@ def test_the_afferent_stays_with_the_prediction_and_what_is_not_asked_for_again_
         words = ["--no-intervals", "--beside", "none"]
         assert run(["predict", str(small), *words]) == 3  # done, with a loss that is named
     errors = capsys.readouterr().err
-    assert ("not kept: the disk is full" in errors, "intervals" in errors) == (True, False)  # the file still holds them
+    assert ("not saved: the disk is full" in errors, "intervals" in errors) == (True, False)  # the file holds them
     run(["predict", str(small), *words])
     assert "intervals of the SED (--intervals)" in capsys.readouterr().err
     document = json.loads((small / "prediction.json").read_text())["afferent"]

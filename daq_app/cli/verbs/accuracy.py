@@ -1,7 +1,7 @@
-"""Measure on this machine how fast the solver is and how true, and write one page of it.
+"""Measure the solver's speed and accuracy on this machine, and write one page.
 
-Time against true error, estimates against true errors, orders of convergence, hard cases, costs, and whether targets of
-speed are met. Ctrl-C stops it and keeps what was measured until then. Run it while nothing else runs.
+It shows time against true error, estimates against true errors, orders of convergence, hard cases, costs, and whether
+targets of speed are met. Ctrl-C stops it and keeps the measurements made so far. Run it on an idle machine.
 """
 
 import argparse

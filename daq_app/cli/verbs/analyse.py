@@ -1,7 +1,7 @@
-"""Find every stroke of a session: onset, lift, steady window, friction, speed, direction, and what is wrong with it.
+"""Find every stroke of a session: onset, lift, steady window, friction, speed, direction and flaws.
 
-Each flaw is named; where honesty allows no number there is none. With flaws the exit code is 3. Intervals come from a
-seeded block bootstrap over sensor noise, zero, calibration and choice of window.
+Each flaw is named; numbers that cannot be given honestly are withheld. With flaws the exit code is 3. Intervals come
+from a seeded block bootstrap over sensor noise, zero, calibration and choice of window.
 """
 
 import argparse

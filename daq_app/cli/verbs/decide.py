@@ -1,8 +1,8 @@
-"""Record what a person decides about a stroke: its window, its ends, its direction, or that it stays out.
+"""Record a person's decision about a stroke: its window, its ends, its direction, or that it is excluded.
 
-The recording stays as it is: the decision is a line more in decisions.jsonl beside it, with who, when, why and what
-stood there before. Every analysis, prediction, report, export and study made from then on goes by it. --undo takes one
-back, by a line of its own. Times are seconds on the device's clock, as 'daq-app analyse' prints them.
+The recording is not changed: the decision is added to decisions.jsonl next to it, with author, time, reason and
+previous value. Every later analysis, prediction, report, export and study applies it. --undo withdraws a decision by
+adding another line. Times are seconds on the device's clock, as 'daq-app analyse' prints them.
 """
 
 import argparse

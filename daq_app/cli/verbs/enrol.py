@@ -1,7 +1,7 @@
 """Enrol a subject in a study: a row of its design is reserved, and given back when the subject is withdrawn.
 
 A study is a folder. --protocol makes it, and fixes its protocol; --blind hides which stimulus bears which code until
-'daq-app unblind' opens the key. Without a subject the study is shown as it stands.
+'daq-app unblind' opens the key. Without --subject the study is printed.
 """
 
 import argparse

@@ -1,7 +1,7 @@
-"""Write a session in a format of others; --format lists them.
+"""Export a session for other programs, in one of the formats of --format.
 
-Numbers kept in the session (analysis.json, prediction.json) go with it; the analysis is made where none was kept. An
-export as csv, bids or hdf5 can be imported again and is the session it was.
+The stored analysis.json and prediction.json are exported too; an analysis that was not stored is computed. An export
+as csv, bids or hdf5 can be imported again as the same session.
 """
 
 import argparse

@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_number(parser, "--mu", float, (0.0, 5.0), meaning, _MU, "MU")
     meaning = f"one standard deviation of each stiffness about the published one, as a factor ({FACTOR:g}, assumed)"
     add_number(parser, "--prior", float, (1.1, 4.0), meaning, FACTOR, "FACTOR")
-    add_flag(parser, "--relaxation", "also how the finger relaxes while the stage stands; --scene gets it")
+    add_flag(parser, "--relaxation", "also fit how the finger relaxes while the stage holds; --scene includes it")
     add_seed(parser, "of the posterior's draws (0)", largest=2**32)
     parser.add_argument("--scene", type=Path, metavar="OUT.toml", help="write the finger found as a scene file")
     add_calibration(parser)
@@ -117,7 +117,7 @@ def _curves(options: argparse.Namespace, recording: Recording, settings: Analysi
     if not curves.presses:
         reason = curves.left_out[0] if curves.left_out else "It holds no press."
         raise FitError(
-            f"{recording.folder} holds no press that {options.displacement} follows. {reason} Press straight down, "
+            f"{recording.folder} holds no press that {options.displacement} covers. {reason} Press straight down, "
             "hold for half a second without a slide, and log on the session's clock."
         )
     return curves
@@ -129,8 +129,8 @@ def _relaxation_flaws(curves: PressCurves) -> list[str]:
     if fall <= FALL:
         return []
     return [
-        f"The force falls by {100.0 * fall:.0f} % while the stage stands: the finger relaxes, which bends its force on "
-        "the way down too, and layers are off by more than their intervals. Ask for --relaxation."
+        f"The force falls by {100.0 * fall:.0f} % while the stage holds: the finger relaxes, which distorts the force "
+        "on the way down too, and layers are off by more than their intervals; use --relaxation."
     ]
 
 
@@ -140,7 +140,7 @@ def _fit(
     """Return the fit to the presses, and the solver's check of the fitted finger. Raises FitError."""
     holds = [(press, hold) for press, hold in zip(curves.presses, curves.holds, strict=True) if hold is not None]
     if options.relaxation and not holds:
-        raise FitError("No press is held: let the stage stand for half a second or more, or leave --relaxation out.")
+        raise FitError("No press is held: hold the stage still for half a second or more, or leave --relaxation out.")
     scene, _ = (None, "") if options.finger is None else finger_in(options.finger)
     finger = template(with_own_finger(PredictionOptions(scene=scene), plan))
     progress = console.reporter("solving presses")

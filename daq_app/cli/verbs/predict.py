@@ -1,6 +1,6 @@
 """Predict the strain-energy density at the receptor for each trial of a session, with its error estimate.
 
-Beside it stand the model's force times the finger's width, the measured force, the depth at which they would match, and
+It also prints the model's force times the finger's width, the measured force, the depth at which they would match, and
 the same press slid the other way.
 """
 

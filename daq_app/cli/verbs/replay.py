@@ -1,8 +1,8 @@
-"""Run a recorded session once more from its readings, and compare what comes out with what was recorded.
+"""Run a recorded session again from its readings, and compare the results with the recording.
 
-Transducer and people are those of the recording: readings with sequence, device counter, status and host time, and what
-was done, when. Course, detector and analysis are those of this program. The event log, the readings and every number
-made from them are then compared. Exit code 0: all is identical; 3: the differences are named.
+The recording supplies the readings (sequence, device counter, status and host time) and what people did, and when.
+This program supplies course, detector and analysis. The event log, the readings and every number computed from them
+are then compared. Exit code 0: all are identical; 3: the differences are named.
 """
 
 import argparse

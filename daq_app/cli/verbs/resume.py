@@ -1,6 +1,6 @@
-"""Go on with a session that was cut short: at the same trial, in the same file, with the people it began with.
+"""Resume a session that was cut short: at the same trial, in the same file, with the people it began with.
 
-Nothing recorded is altered: the take that was open is discarded with its reason, and the gap is recorded.
+Nothing recorded is altered: the open take is discarded with its reason, and the gap is recorded.
 """
 
 import argparse

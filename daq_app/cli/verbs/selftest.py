@@ -1,7 +1,7 @@
-"""Pull the program's own plug on this computer and this disk, and write a dated certificate of what came of it.
+"""Test crash safety on this computer and this disk, and write a dated certificate of the result.
 
-In a folder of its own it kills its recorder, cuts the end off its log, fills the room it has, and stops it. Sessions
-recorded below the folder DIR later carry the certificate. It takes less than a minute.
+In a temporary folder it kills the recorder, cuts the end off its log, fills the space for a session, and stops the
+recorder. Sessions that are later recorded below DIR carry the certificate. It takes less than a minute.
 """
 
 import argparse
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         certificate = selftest(room, console.progress)
     except SelfTestFailed as failure:
         console.result({"passed": False, "sentence": str(failure), "left_in": str(room)})
-        console.say(f"FAILED: {failure}. What is left of it lies in {room}; report it")
+        console.say(f"FAILED: {failure}. Its files are in {room}; report it")
         return FLAWED
     except KeyboardInterrupt:
         shutil.rmtree(room, ignore_errors=True)
@@ -69,7 +69,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     path = write_certificate(parent, certificate)
     console.result({"passed": True, "certificate": str(path), "warning": warning, **certificate})
     console.say(certificate["sentence"])
-    console.note(None if warning is None else f"all the same, {warning}")
+    console.note(None if warning is None else f"however, {warning}")
     console.say(f"certificate  {path}")
     return DONE if warning is None else FLAWED
 
@@ -90,16 +90,16 @@ def selftest(room: Path, progress: Progress) -> dict[str, Any]:
     stop_ms = _try_stops(room / "stopped")
     progress(0.85, "cutting the ends off logs")
     cuts = _try_cuts(logs, room / "cut", chance)
-    progress(0.9, "filling the room a session has")
+    progress(0.9, "filling the disk space of a session")
     quota = _try_quota(room / "full")
     return {
         "format": SELFTEST_FORMAT,
         "utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "sentence": (
             f"On this computer and disk the recorder was killed {KILLS} times, the end of its log was cut off "
-            f"{cuts} times and its room was filled up: all it had acknowledged was there afterwards "
+            f"{cuts} times and its disk space was filled: everything acknowledged was there afterwards "
             f"({kills['readings'] + quota['readings']} readings, {kills['events']} events), at most "
-            f"{kills['most_lost']:.2f} s of what it had not was lost, and each session went on at the same trial. "
+            f"{kills['most_lost']:.2f} s of the rest was lost, and each session resumed at the same trial. "
             f"A stop took {stop_ms:.0f} ms."
         ),
         "kills": kills,
@@ -211,11 +211,11 @@ def _check_recording(recording: Recording, witness: _WatchedRecorder, trial: int
         raise SelfTestFailed("an event that had been acknowledged was not in the file after a kill")
     block = recording.readings()
     if len(block) < witness.safe or (np.diff(block.sequence) != 1).any():
-        raise SelfTestFailed(f"of {witness.safe} readings that had been acknowledged {len(block)} were left by a kill")
+        raise SelfTestFailed(f"after a kill, {len(block)} of {witness.safe} acknowledged readings were left")
     first = witness.events[0].number if witness.events else 1
     trials = {event.trial for event in recording.events if event.kind == "take_kept" and event.number < first}
     if trial is not None and trial != len(trials) + 1:
-        raise SelfTestFailed(f"the session went on at trial {trial}, and had been killed in trial {len(trials) + 1}")
+        raise SelfTestFailed(f"the session was killed in trial {len(trials) + 1} and resumed at trial {trial}")
 
 
 def _try_stops(room: Path) -> float:
@@ -280,7 +280,7 @@ def _try_quota(folder: Path) -> dict[str, Any]:
     position = 0
     while writer.must_end is None:
         if position > 100 * _RATE:
-            raise SelfTestFailed("a session that had no more room went on without a word")
+            raise SelfTestFailed("a session without disk space continued without a warning")
         writer.readings(_numbered_readings(position, clock.now_ns()))
         position += _RATE
         start = time.monotonic()
@@ -292,11 +292,9 @@ def _try_quota(folder: Path) -> dict[str, Any]:
     recording = Recording.open(folder)
     block = recording.readings()
     if len(block) != safe or safe != position or recording.end is None:
-        raise SelfTestFailed(
-            f"{safe} readings had been acknowledged when the room was full, and {len(block)} were left"
-        )
+        raise SelfTestFailed(f"with the disk space filled, {len(block)} of {safe} acknowledged readings were left")
     if not np.array_equal(block.raw, _numbered_readings(0, 0, position).raw):
-        raise SelfTestFailed("readings came back otherwise than they were written when the room was full")
+        raise SelfTestFailed("readings written while the disk space ran out came back with other values")
     return {"bytes": QUOTA, "readings": safe, "commit_ms": round(float(np.median(spans)) * 1e3, 2)}
 
 

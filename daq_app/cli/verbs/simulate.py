@@ -1,9 +1,8 @@
-"""Serve the other end of a wire on this computer, to try a driver (ours or anybody's) without hardware.
+"""Serve a simulated device on this computer, to try a driver (ours or any other) without hardware.
 
 The networked force/torque box (net-ft) speaks UDP, TCP and HTTP on loopback, on the device's own ports by
 default, and on a free HTTP port where 80 is refused. The stand-alone controller (serial-ft) and the RS-485 transducer
-(digital-ft) sit on a pseudo-terminal of Linux or macOS. Without a script the paper's ten surfaces are stroked again and
-again.
+(digital-ft) use a pseudo-terminal of Linux or macOS. Without --script the paper's ten surfaces are stroked repeatedly.
 """
 
 import argparse

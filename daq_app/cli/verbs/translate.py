@@ -1,8 +1,7 @@
 """Write the file that a translator fills in: a protocol's texts as TOML tables, or the program's own as XLIFF.
 
-What is translated already is kept; what is not stands there in the language it is translated from. The tables go to the
-end of the protocol's file. An XLIFF file is edited with Qt Linguist, another editor of XLIFF or as text, and the window
-reads it as it is.
+Texts that are already translated are kept; untranslated texts stay in the source language. Append the tables to the
+protocol's file. Edit an XLIFF file with Qt Linguist, another editor of XLIFF or as text; the window reads it directly.
 """
 
 import argparse

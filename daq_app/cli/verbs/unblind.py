@@ -1,7 +1,7 @@
-"""Open the sealed key of a blinded study, or for one of its sessions: from then on stimuli have their index.
+"""Open the sealed key of a blinded study, or for one of its sessions: from then on stimuli are shown by their index.
 
-It is recorded with time and who, in the study and in each session's folder, together with the SHA-256 of every number
-that was made before: what was concluded blind stays provable. It cannot be taken back.
+The study and each session's folder record who opened the key and when, and each session the SHA-256 of every result
+computed before: blind conclusions remain provable. This cannot be undone.
 """
 
 import argparse

@@ -1,6 +1,6 @@
-"""Check every checksum of a session, and make every number that was derived from it once more.
+"""Check every checksum of a session, and compute every derived number again.
 
-Exit code 0: whole; 3: readable, with what is lost or differs named; 1: unreadable.
+Exit code 0: whole; 3: readable, with losses or differences named; 1: unreadable.
 """
 
 import argparse

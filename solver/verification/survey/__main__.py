@@ -19,8 +19,8 @@ Key = tuple[str, int, Kinematics]
 CAPTION = (
     "Two answers of each scene. Above: share of estimates at or above the true error. Near: below ten times the larger "
     "of true error and 0.02 %. Missed unsaid: tolerances said to be met that are not, without a warning. Ratio: median "
-    "of estimate by error. Corrected: median of its error by the answer's. Counted where the truth can tell. Above and "
-    "ratio: of the corrected SED, too."
+    "of estimate by error. Corrected: median of its error by the answer's. Counted where the reference is accurate "
+    "enough. Above and ratio: of the corrected SED, too."
 )
 
 
