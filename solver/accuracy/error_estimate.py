@@ -8,8 +8,8 @@ error on h is the series without its first term.
 
 Two meshes may agree by chance on where contact states change: an edge of contact, of stick or of slip at the bound lies
 anywhere between two nodes. Each edge is moved by one node of h to either side at otherwise fixed contact states, and
-the linearised body is solved again. A result is a parabola of an edge's position about the true one, so that a third of
-the larger change counts. The sum over the edges bounds their part of the error.
+the linearised body is solved again. A result is a parabola of an edge's position about the true one, so that a share of
+the larger change counts: a third at second order, all of it at first. The sum over the edges bounds their part.
 
 Much of the error is common to all surfaces of one finger and cancels in their differences. The rest is estimated in the
 same way for the worst pair of surfaces. Only the edges differ: those of two surfaces err independently, so that their
