@@ -143,7 +143,7 @@ def edges(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> tuple[float
 
 
 def width(arcs: Array, x: Array, force: Array, touching: NDArray[np.bool_]) -> float:
-    """Return the width of the contact along the surface [mm], 0 where nothing touches.
+    """Return the width of the contact along the surface [mm], 0 without contact.
 
     `x` (k,) are deformed positions along the surface [mm]. Where contact is too short to locate its ends, it reaches
     from the outermost touching nodes halfway to their open neighbours.

@@ -1,4 +1,4 @@
-"""The prediction of one scene: numbers with error estimates, the model, audits, and the state itself."""
+"""The prediction of one scene: results with error estimates, the model, audits, and the state."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields

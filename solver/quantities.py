@@ -313,5 +313,5 @@ QUANTITIES = (
     VON_MISES,
 )
 NAMES: tuple[str, ...] = tuple(quantity.name for quantity in QUANTITIES)
-# Quantities drawn over the whole tissue. Principal stresses are only drawn: no receptor is said to respond to them.
+# Quantities in pictures of the tissue. Principal stresses are only shown: no receptor is said to respond to them.
 FIELDS = (SED, GREATEST_STRAIN, LEAST_STRAIN, GREATEST_STRESS, LEAST_STRESS, VON_MISES, PRESSURE)

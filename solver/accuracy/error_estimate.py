@@ -52,7 +52,7 @@ def half_width(change: Array, edges: Array, order: float = ORDER, share: Array |
 
 
 def edge_share(order: float) -> float:
-    """Return the counting share of a result's change as an edge of contact moves by one node of the nested mesh.
+    """Return the counted share of a result's change when an edge of contact moves by one node of the nested mesh.
 
     The result is a parabola of the edge's position about the true one, which is at most one such node away on the mesh
     and half a node on the nested one. So the errors E_H and E_h lie between 0 and the change c, and between 0 and c/4.
@@ -95,7 +95,7 @@ class Steps:
     def of(usual: Array, fewer: Array, tolerance: float | None) -> "Steps":
         """Return the fewest steps that meet a tolerance.
 
-        `usual` (c,) and `fewer` (2, c) are numbers after the usual steps and after PARTS of them, on a coarse mesh.
+        `usual` (c,) and `fewer` (2, c) are results after the usual steps and after PARTS of them, on a coarse mesh.
         """
         excess = (fewer - usual) / (1.0 / PARTS - 1.0)[:, None]
         bound = np.abs(excess).sum(axis=0)
@@ -134,7 +134,7 @@ def edge_changes(
     states: Sequence[tuple[EquilibriumState, ForceLoad | None]],
     numbers: Callable[[Sequence[EquilibriumState]], Array],
 ) -> tuple[Array, list[Array]]:
-    """Return the numbers (c, n) of states, and for each state their changes (m, n) as each of its m edges moves.
+    """Return the results (c, n) of states, and for each state their changes (m, n) as each of its m edges moves.
 
     An edge of contact moves by one node to either side, and the larger change counts. `states` are equilibria with
     their forces, or None for a given depth. `numbers` returns (c, n) for c states. A change is infinite where no
@@ -170,7 +170,7 @@ class NestedState(NamedTuple):
 def nested_state(
     finger: Finger[Patches], state: EquilibriumState, values: Array, changes: Array, steps: Steps | None, order: float
 ) -> NestedState | NotConverged:
-    """Return a state of the nested mesh with its numbers, from `values` (COUNT + r,) and `changes` (m, COUNT + r).
+    """Return a state of the nested mesh with its results, from `values` (COUNT + r,) and `changes` (m, COUNT + r).
 
     `steps` are its load steps where it depends on its load path, and `order` is its `order_of`. Returns NO_NESTED_STATE
     where no equilibrium exists with an edge moved, as at a friction limit.

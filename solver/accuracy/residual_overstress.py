@@ -25,7 +25,7 @@ from solver.scene.tables import Relaxation, SceneError
 _MARGIN = 4.0  # height of the undeformed skin up to which contact is considered, relative to the indentation
 # Elements per tip radius, and load steps of the press and of the slide each. Compared with 16 steps at a fineness of 5,
 # estimates of 42 small-strain scenes differ by at most 4 % of the SED. Compared with 8 at a fineness of 4, those of 60
-# finite-strain scenes differ by 5 % of it or by a tenth of the estimate; four, with assumed weights, by a sixth.
+# finite-strain scenes differ by 5 % of it or a tenth of the estimate, four by a sixth: but the weights are assumed.
 _FINENESS = 2.0
 _STEPS = {"small": 1, "finite": 2}
 

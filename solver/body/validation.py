@@ -1,4 +1,4 @@
-"""Validation of a user's own body; an error is one sentence."""
+"""Validation of a user's body; each error is one sentence."""
 
 from collections.abc import Sequence
 from math import isfinite
@@ -145,7 +145,7 @@ def _check_skin(mesh: Mesh) -> None:
 
 
 def check_loads(mesh: Mesh, loads: Array | None, prescribed: Array | None) -> None:
-    """Raise BodyError unless dead `loads` and `prescribed` are (nodes, 2) and finite, and move only what is held."""
+    """Raise BodyError unless `loads` and `prescribed` are finite (nodes, 2), the latter 0 where nothing is held."""
     for name, array in (("loads", loads), ("prescribed", prescribed)):
         if array is None:
             continue

@@ -50,7 +50,7 @@ class Finger(ABC, Generic[PatchKind]):
 
     @classmethod
     def of(cls, scene: Scene, sizing: Sizing) -> Self:
-        """Return the finger of `scene` on a new mesh, whatever its friction and loading.
+        """Return the finger of `scene` on a new mesh, which does not depend on its friction and loading.
 
         Raises SceneError where the outline cannot be meshed, NotConverged where the stiffness is lost in round-off.
         """

@@ -383,8 +383,8 @@ def _layers(finger: Finger, fine: float, size: float, receptor: Receptor, thin: 
 def _around_point(place: Array, near: float, far: float, size: float) -> tuple[float, float, Array]:
     """Return the lines that frame an ending between `near` and `far`, and the largest element sizes (n,) [mm].
 
-    Averages over whole elements smooth their errors. A point-like ending averages nothing: it lies in the middle of an
-    element of `size`, where strains are more accurate than at its ends. Elements grow from there.
+    Averages over whole elements smooth their errors. A point-like ending has no such average: it lies in the middle of
+    an element of `size`, where strains are more accurate than at its ends. Elements grow from there.
     """
     middle, size = (near + far) / 2.0, max(far - near, size)
     largest = size + _SIZES.from_point * np.maximum(np.abs(place - middle) - size / 2.0, 0.0)

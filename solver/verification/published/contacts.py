@@ -101,7 +101,7 @@ def whole_cylinder(load: float, half_width: float, peak: float) -> Hertz:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LightContact:
-    """A half-plane under a light press without friction; it is nearly incompressible, so nothing couples."""
+    """A nearly incompressible half-plane under a light frictionless press: pressure and traction do not couple."""
 
     body: LinearBody | FiniteBody
     newton: Newton
