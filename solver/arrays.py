@@ -1,4 +1,4 @@
-"""Array types that all modules share, their memory, two-by-two matrices, and arguments of compiled loops."""
+"""Array types shared by all modules, their memory, two-by-two matrices, and arguments of compiled loops."""
 
 import ctypes
 import sys
@@ -12,14 +12,14 @@ Indices = NDArray[np.int64]
 Narrow = NDArray[np.int32]
 Flags = NDArray[np.bool_]
 
-_LARGEST, _MOST = 32 << 20, 64 << 20  # bytes of one array, the most of the manual of mallopt, and of all
+_LARGEST, _MOST = 32 << 20, 64 << 20  # bytes of one array, the maximum in mallopt's manual, and of all arrays
 
 
 def _keep_freed_memory() -> None:
-    """Let this process keep the memory of freed arrays for the next ones, where the C library is glibc.
+    """Make this process reuse the memory of freed arrays, where the C library is glibc.
 
     Otherwise the system clears new pages for every temporary array, a quarter of the work of a small solve. Twice as
-    much memory saves no more; half as much saves half of that.
+    much memory saves no more; half as much saves an eighth of the work.
     """
     if sys.platform == "linux" and hasattr(library := ctypes.CDLL(None), "mallopt"):
         for parameter, size in ((-1, _MOST), (-3, _LARGEST)):  # M_TRIM_THRESHOLD, M_MMAP_THRESHOLD
@@ -30,19 +30,19 @@ _keep_freed_memory()
 
 
 def determinant(matrices: Array) -> Array:
-    """Return the determinants (...) of matrices (..., 2, 2), complex ones too."""
+    """Return the determinants (...) of real or complex matrices (..., 2, 2)."""
     return matrices[..., 0, 0] * matrices[..., 1, 1] - matrices[..., 0, 1] * matrices[..., 1, 0]
 
 
 def inverse(matrices: Array) -> Array:
-    """Return the inverses of matrices (..., 2, 2), complex ones too."""
+    """Return the inverses of real or complex matrices (..., 2, 2)."""
     adjugate = np.empty_like(matrices)
     adjugate[..., 0, 0], adjugate[..., 1, 1] = matrices[..., 1, 1], matrices[..., 0, 0]
     adjugate[..., 0, 1], adjugate[..., 1, 0] = -matrices[..., 0, 1], -matrices[..., 1, 0]
     return adjugate / determinant(matrices)[..., None, None]
 
 
-NEO_HOOKEAN = 2.0  # Ogden's exponent of the neo-Hookean law, which does not stiffen
+NEO_HOOKEAN = 2.0  # Ogden's exponent of the neo-Hookean law, whose shear modulus is constant
 
 
 class ElementArrays(NamedTuple):
@@ -51,7 +51,7 @@ class ElementArrays(NamedTuple):
     grad_x: Array  # (e, q, 9) gradients of the shape functions at the quadrature points [1/mm]
     grad_y: Array  # (e, q, 9)
     weight: Array  # (e, q) areas of the quadrature points [mm2]
-    modes: Array  # (e, q, 3) pressure modes there, orthonormal over the element [1/mm]
+    modes: Array  # (e, q, 3) pressure modes at these points, orthonormal over the element [1/mm]
     laplace: Array  # (e, 9, 9) integrals of grad N_i . grad N_j [-]
     shear: Array  # (e,) [MPa]
     stiffening: Array  # (e,) Ogden's exponent [-]
@@ -66,8 +66,8 @@ class ElementSystem(NamedTuple):
     tangent: Array  # (e, 16, 16) of the outer nodes, lower half [N/mm per mm]
     force: Array  # (n,) internal forces [N/mm]
     recovery_matrix: Array  # (e, 2, 17): displacement of the centre = -(recovery_matrix @ (outer displacements, 1))
-    condensed_inverse: Array  # (e, 3) of the centre's stiffness: xx, xy, yy
-    dilate: Array  # (e, 3, 18) derivatives of the modes of ln J by displacements
+    condensed_inverse: Array  # (e, 3) inverse of the centre's stiffness: xx, xy, yy
+    dilate: Array  # (e, 3, 18) derivatives of the modes of ln J with respect to displacements
     volume: Array  # (e, 3) modes of ln J
     overstress_force: Array  # (e, 18) of the overstress, ordered as in `ElementWork`; (0, 18) without relaxation
     overstress_tangent: Array  # (e, 18, 18) of the overstress; (0, 18, 18) without relaxation
@@ -76,22 +76,22 @@ class ElementSystem(NamedTuple):
 class ElementWork(NamedTuple):
     """Memory for one element. Sums over quadrature points are products of small matrices of a fixed size.
 
-    Columns are x of the eight outer nodes, y of these, and x and y of the centre.
+    Columns are x of the eight outer nodes, y of these nodes, and x and y of the centre.
     """
 
     f_inv_t: Array  # (q, 4) F^-T: xx, xy, yx, yy
     f_diff: Array  # (q, 4) F - F^-T
-    h: Array  # (q, 18) F^-T times gradients of shape functions: in the deformed body
-    s: Array  # (q, 18) F - F^-T times these gradients
+    h: Array  # (q, 18) F^-T times gradients of shape functions: their gradients in the deformed body
+    s: Array  # (q, 18) F - F^-T times gradients of shape functions
     weighted_modes: Array  # (q, 3) weights times pressure modes
-    push: Array  # (q,) weight times present shear modulus
-    shear_slope: Array  # (q,) weight times twice its derivative by Q
+    push: Array  # (q,) weight times current shear modulus
+    shear_slope: Array  # (q,) weight times twice the derivative of this modulus with respect to Q
     bend: Array  # (q,) weight times (shear modulus - pressure)
     d: Array  # (3, 18) derivatives of the modes of ln J
     f: Array  # (18,) internal forces
-    by_x: Array  # (9, 16) integrals of products of deformed gradients, by x of a node
-    by_y: Array  # (9, 16) and by its y
-    laplace: Array  # (9, 9) as in `ElementArrays`, times the present shear modulus [N/mm per mm]
+    by_x: Array  # (9, 16) integrals of products of deformed gradients, a row for x of each node
+    by_y: Array  # (9, 16) a row for y of each node
+    laplace: Array  # (9, 9) as in `ElementArrays`, times the current shear modulus [N/mm per mm]
     left: Array  # (18, 5) left @ right is the tangent's part from three pressure modes and the centre
     right: Array  # (5, 16)
     dyads: Array  # (18, 18) terms of stiffening and overstress in the tangent
@@ -120,18 +120,18 @@ class SymbolicFactorization(NamedTuple):
     border_at: Narrow  # (p,) start of each part's border in `numbers` and `place`
     numbers: Narrow  # unknowns of all borders
     place: Narrow  # position of each in the front of the parent
-    run: Narrow  # where in its border the run ends of entries whose positions are consecutive
+    run: Narrow  # end, within its border, of each entry's run of consecutive positions
     factor_at: Indices  # (p,) start of each part's factor
     wait_at: Indices  # (p,) start of each part's Schur complement in `waiting`
     leaf: Narrow  # (p, 2) range of `order` that belongs to each leaf
     order: Narrow  # (e,) elements, leaf after leaf
-    position: Narrow  # (e, 16) positions of their unknowns in the front of their leaf, in this order; -1 where fixed
+    position: Narrow  # (e, 16) positions of the unknowns of `order` in the front of their leaf; -1 where fixed
     factors: int  # size of the memory for factors
     waiting: int  # size of the memory for Schur complements
 
 
 class Factors(NamedTuple):
-    """The factors of an elimination and their places; the integer arrays are those of a SymbolicFactorization."""
+    """The factors of an elimination and their positions; the integer arrays are those of a SymbolicFactorization."""
 
     start: Narrow
     inner: Narrow
@@ -155,15 +155,15 @@ class Skin(NamedTuple):
 
     held: Narrow  # (k,) HELD_X, HELD_Y or their sum where displacements are prescribed, else 0
     middle: Narrow  # (k,) 1 at the middle of an edge whose length follows the deformation, else 0
-    fixed_length: Array  # (k,) tributary length whatever the state [mm]
+    fixed_length: Array  # (k,) tributary length that does not depend on the state [mm]
 
 
 class ContactControl(NamedTuple):
-    """Which of depth and travel follow from prescribed forces in one linear system, and how often states may change."""
+    """Whether depth and travel follow from prescribed forces in one linear system, and how often states may change."""
 
     kind: int  # DEPTH_CONTROL, PUSH_CONTROL or DRAG_CONTROL
-    drag: float  # of the surface along +x [N/mm]
-    push: float  # and along +y
+    drag: float  # force of the surface along +x [N/mm]
+    push: float  # force along +y [N/mm]
     max_increment: float  # of depth or travel [mm]
     max_rounds: int  # of changes of the contact states
 
@@ -181,26 +181,26 @@ class SkinPosition(NamedTuple):
     """Positions of the skin's nodes relative to the surface."""
 
     x: Array  # (k,) along the surface [mm]
-    above: Array  # (k,) height over it [mm]
-    anchor: Array  # (k,) positions along it at which nodes stick [mm]
+    above: Array  # (k,) height over the surface [mm]
+    anchor: Array  # (k,) positions along the surface at which nodes stick [mm]
 
 
 class ContactStates(NamedTuple):
     """States of the skin's k nodes and the forces on them."""
 
     state: Narrow  # (k,) OPEN, STICK, SLIP or SHEAR_LIMITED
-    sense: Narrow  # (k,) +1 or -1: sense of the friction force where they slip
-    reaction: Array  # (k, 2) forces of the surface on them [N/mm]
+    sense: Narrow  # (k,) +1 or -1: sense of the friction force on slipping nodes
+    reaction: Array  # (k, 2) forces of the surface on the nodes [N/mm]
 
 
 class ContactSystem(NamedTuple):
-    """The linear system of contact and memory for it: n = 2 k + 3 unknowns at most."""
+    """The linear system of contact and its memory: n = 2 k + 3 unknowns at most."""
 
     length: Array  # (k,) length of skin on which the traction bound acts at each node [mm]
     free: Narrow  # (n,) the unknowns, displacements or forces
     matrix: Array  # (n n,)
     right: Array  # (n, 4)
-    steps: Array  # (2 k, 4) of the skin: to equilibrium, and by depth, mu and travel of the surface along +x
+    steps: Array  # (2 k, 4) of the skin: to equilibrium; derivatives with respect to depth, mu and travel along +x
     motion: Array  # (2,) changes of depth and travel in the first column, for prescribed forces [mm]
 
 
@@ -209,7 +209,7 @@ class StateChanges(NamedTuple):
 
     state: Narrow  # (k,)
     sense: Narrow  # (k,)
-    violation: Array  # (k,) how much each node violates its present state [N/mm]; -1 without contradiction
+    violation: Array  # (k,) violation of the current state by each node [N/mm]; -1 without contradiction
 
 
 class Slack(NamedTuple):
@@ -217,4 +217,4 @@ class Slack(NamedTuple):
 
     force: float  # [N/mm]
     height: float  # [mm]
-    by_height: float  # largest force by largest height [N/mm per mm]
+    by_height: float  # ratio of the largest force to the largest height [N/mm per mm]

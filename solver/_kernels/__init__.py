@@ -1,6 +1,6 @@
 """The compiled loops of the solver (numba, cached on disk). No other module is compiled.
 
-The tests compare them with plain NumPy versions.
+Tests compare the loops with plain NumPy versions.
 """
 
 import gc
@@ -16,10 +16,10 @@ from solver.progress import interlude
 
 
 class _Compilation(events.Listener):
-    """Report which loop numba compiles, and deliver a Ctrl-C that arrives meanwhile.
+    """Report which loop numba compiles, and deliver a Ctrl-C that arrives during the compilation.
 
     Python raises KeyboardInterrupt between two bytecodes. Where LLVM calls back into Python, the exception is printed
-    and lost. So it is raised again once the loop is compiled.
+    and lost, so it is raised again once the loop is compiled.
     """
 
     def __init__(self) -> None:
@@ -39,7 +39,7 @@ class _Compilation(events.Listener):
         self._loop, self._open = loop, ExitStack()
         doing = f"compiling {loop.py_func.__name__}, loop number {self._count}, once on this machine"
         self._open.enter_context(interlude(doing))
-        if gc.isenabled():  # numba makes millions of lasting objects: scanning them costs a sixth of the time
+        if gc.isenabled():  # numba makes millions of permanent objects: scanning them costs a sixth of the time
             gc.disable()
             self._open.callback(gc.enable)
         self._hear_ctrl_c()

@@ -1,7 +1,7 @@
 """Search for the contact states: a primal-dual active set on the condensed skin of a linearised body.
 
 Alart and Curnier 1991, Comput. Meth. Appl. Mech. Eng. 92, 353; Hüeber and Wohlmuth 2005, ibid. 194, 3147. All states
-that contradict the solution change at once. After states have repeated, only the worst one changes in a round.
+that contradict the solution change together. Once a set of states has recurred, only the worst one changes in a round.
 """
 
 import numpy as np
@@ -38,11 +38,11 @@ UNSETTLED, SINGULAR = 0, -1  # results of `solve_active_set` other than the numb
 def contradictions(
     states: ContactStates, above: Array, slip: Array, length: Array, load: LoadArguments, changes: StateChanges
 ) -> int:
-    """Fill `changes` with the states and senses that a solution requires; return how many nodes contradict it.
+    """Fill `changes` with the states and senses that a solution requires; return the number of contradicting nodes.
 
     `above` (k,) are heights over the surface. `slip` (k,) are displacements along +x relative to the surface since the
-    last step, and `length` (k,) is that of `bounded_length`. Where the load has a sense, every touching node slips with
-    the friction force in that sense; else nodes stick, slip and reverse.
+    last step, and `length` (k,) comes from `bounded_length`. Where the load has a sense, every touching node slips with
+    the friction force in that sense; otherwise nodes stick, slip and reverse.
     """
     state, sense, reaction = states
     next_state, next_sense, violations = changes
@@ -75,9 +75,9 @@ def contradictions(
 
 @subroutine
 def touching_state(load: LoadArguments) -> int:
-    """Return the state first assumed for a node that comes into contact.
+    """Return the first guess of the state of a node that comes into contact.
 
-    With steep friction, slip is a bad guess: the node's own drag may lift it off by more than it is pressed.
+    With steep friction, slip is a bad guess: the node's drag may lift it off by more than it is pressed.
     """
     if load.sense != 0:
         return SHEAR_LIMITED if load.mu > SHEAR_LIMITED_MU and load.tau < np.inf else SLIP
@@ -88,7 +88,7 @@ def touching_state(load: LoadArguments) -> int:
 def friction_state(
     state: int, sense: int, reaction: Array, slip: float, bound: float, load: LoadArguments, slack: Slack
 ) -> tuple[int, int, float]:
-    """Return state and sense of a pressed node, and how much it violates its present ones [N/mm]."""
+    """Return the state and sense of a pressed node, and its violation of the current ones [N/mm]."""
     coulomb = load.mu * max(reaction[1], 0.0)
     most = min(coulomb, bound)
     slips = SLIP
@@ -120,13 +120,13 @@ def solve_active_set(
 ) -> int:
     """Solve the skin's system of contact, changing `states` until none contradicts the solution.
 
-    States change `max_rounds` times at most. Exact for the linearised body where the rounds suffice. With a
+    States change at most `max_rounds` times. The result is exact for the linearised body if the rounds suffice. With a
     `compliance`, the unknowns are forces, of which there are fewer. Fills the reactions of `states`, and `steps` of
     `system`; with a compliance only the step to equilibrium. Returns the number of systems solved, UNSETTLED or
     SINGULAR.
     """
     size, steps, motion = states.state.shape[0], system.steps, system.motion
-    sums, loads = np.zeros((2, 2 * size)), np.zeros(2)  # resultant: derivatives by steps or forces, constant part
+    sums, loads = np.zeros((2, 2 * size)), np.zeros(2)  # resultant: factors of steps or forces, constant part
     answer, unloaded_step = steps, loads
     by_forces = compliance.shape[0] > 0
     if by_forces:
@@ -151,7 +151,7 @@ def solve_active_set(
         scatter_answer(system, count, by_forces, states, load.mu, answer)
         sticks, by_drag = count_in(states.state, STICK) > 0, control.kind == DRAG_CONTROL
         if by_drag and not sticks and may_hold and round_number < control.max_rounds:
-            hold(states.state)  # free along x, the body needs sticking nodes: all stick, then change one by one
+            hold(states.state)  # the body is free along x without sticking nodes: all stick, then change one by one
             may_hold, one_by_one = False, True
             continue
         regular = control_forces(states.state, sums, loads, answer, control, sticks, motion)
@@ -173,7 +173,7 @@ def solve_active_set(
 
 @subroutine
 def sum_stiffness(body: CondensedArrays, kind: int, sums: Array, loads: Array) -> None:
-    """Fill the derivatives of the resultant by steps, `sums` (2, 2 k), and its constant part `loads` (2,).
+    """Fill the derivatives of the resultant with respect to steps, `sums` (2, 2 k), and its constant part `loads` (2,).
 
     Nothing is filled where the depth is prescribed.
     """
@@ -186,7 +186,7 @@ def sum_stiffness(body: CondensedArrays, kind: int, sums: Array, loads: Array) -
 
 @subroutine
 def unload(force: Array, compliance: Array, sums: Array, unloaded_step: Array) -> None:
-    """Fill the derivatives of the resultant by forces, `sums` (2, 2 k), and the `unloaded_step` (2 k + m,)."""
+    """Fill the derivatives of the resultant with respect to forces, `sums` (2, 2 k), and `unloaded_step` (2 k + m,)."""
     for i in range(force.shape[0]):
         sums[i % 2, i] = 1.0
         for c in range(unloaded_step.shape[0]):
@@ -268,9 +268,9 @@ def recover_steps(compliance: Array, answer: Array, unloaded_step: Array, steps:
 
 @subroutine
 def change_states(states: ContactStates, changes: StateChanges, slip: Array, entries: Narrow, one_by_one: bool) -> None:
-    """Change all states that contradict the solution, or the worst one alone.
+    """Change all states that contradict the solution, or only the worst one.
 
-    `entries` (k,) counts how often a node comes into contact; every second time it starts to slip.
+    `entries` (k,) counts how often a node comes into contact; every second time it begins in slip.
     """
     state, sense, _ = states
     next_state, next_sense, violations = changes
@@ -294,7 +294,7 @@ def change_states(states: ContactStates, changes: StateChanges, slip: Array, ent
 def record_states(states: ContactStates, history: Narrow, count: int) -> bool:
     """Return whether the states are among the first `count` of the `history` (n, 2, k), and add them to it.
 
-    If they are, the history starts again from them.
+    If so, the history restarts with these states.
     """
     state, sense, _ = states
     cycle = False
@@ -313,10 +313,10 @@ def record_states(states: ContactStates, history: Narrow, count: int) -> bool:
 def control_forces(
     state: Narrow, sums: Array, loads: Array, answer: Array, control: ContactControl, sticks: bool, motion: Array
 ) -> bool:
-    """Add the changes of depth, and of travel where `sticks`, that balance the prescribed forces.
+    """Add the changes of depth, and of travel if a node `sticks`, that balance the prescribed forces.
 
     They change the first column of `answer` (2 k, 4). The surface's resultant along x and y is `loads` (2,) plus `sums`
-    (2, 2 k) times the answer. Fills `motion` (2,) with both changes, `max_increment` at most. Returns False where
+    (2, 2 k) times the answer. Fills `motion` (2,) with both changes, at most `max_increment`. Returns False where
     nothing touches, or no change balances the forces.
     """
     motion[0] = motion[1] = 0.0
@@ -355,9 +355,9 @@ def control_forces(
 def update_contact_states(
     states: ContactStates, position: SkinPosition, load: LoadArguments, skin: Skin, length: Array
 ) -> int:
-    """Update `states` that contradict the forces on the skin or its position; return how many changed.
+    """Update `states` that contradict the forces on the skin or its position; return the number of changes.
 
-    The anchors are the positions from which nodes have slid. Fills `length` (k,), on which the traction bound acts.
+    The anchors are the positions from which nodes have slipped. Fills `length` (k,), on which the traction bound acts.
     """
     bounded_length(position.x, skin, length)
     size, slip = length.shape[0], np.empty(length.shape[0])

@@ -16,7 +16,7 @@ States = NDArray[np.int8]
 Loop = TypeVar("Loop", bound=Callable[..., Any])
 Result = TypeVar("Result")
 
-HELD_X, HELD_Y = 1, 2  # flags of a skin node whose displacement is prescribed; their sum: both
+HELD_X, HELD_Y = 1, 2  # flags of a skin node with a prescribed displacement; their sum for both directions
 OPEN, STICK, SLIP, SHEAR_LIMITED = 0, 1, 2, 3  # contact states of a skin node
 # all of fastmath except nnan and ninf: nan and infinity keep their meaning
 _OPTIONS: dict[str, Any] = {
@@ -29,10 +29,10 @@ _ARRAYS = _FOLDER.parent / "arrays.py"  # types of the loops' arguments
 def _cache_folder() -> Path:
     """Return the folder where numba keeps compiled loops: one for each version of their sources.
 
-    Numba checks only the file of a loop to see whether its code is outdated, not the functions that the loop calls. The
-    process runs what lies in the folder, so only the user may have write access. The first such folder is taken: the
-    one that the environment variable NUMBA_CACHE_DIR names, one beside the sources, or one among the user's caches.
-    Without any, this process gets an empty folder and compiles everything again.
+    To see whether code is outdated, numba checks only the file of a loop, not the functions that the loop calls. The
+    process runs the code in the folder, so only the user may have write access. The first such folder is used: the one
+    in the environment variable NUMBA_CACHE_DIR, one next to the sources, or one among the user's caches. Without any,
+    this process gets an empty folder and compiles everything again.
     """
     from platformdirs import user_cache_path
 
@@ -47,7 +47,7 @@ def _cache_folder() -> Path:
         places.insert(0, Path(setting).parent if Path(setting).name == version else Path(setting))
     for place in places:
         with suppress(OSError):
-            place.mkdir(mode=0o700, parents=True, exist_ok=True)  # `mode` is not that of the parents it makes
+            place.mkdir(mode=0o700, parents=True, exist_ok=True)  # `mode` does not apply to new parents
             if place == user_cache:
                 place.chmod(0o700)  # another program, or an earlier run, may have made it open to a group
             (place / version).mkdir(mode=0o700, exist_ok=True)
@@ -57,7 +57,7 @@ def _cache_folder() -> Path:
 
 
 def is_private(folder: Path) -> bool:
-    """Return whether this user may write in `folder` and nobody else may, on systems where files have owners."""
+    """Return whether only this user may write in `folder`; on systems without file owners, whether this user may."""
     if not os.access(folder, os.W_OK) or not hasattr(os, "getuid"):
         return os.access(folder, os.W_OK)
     status = folder.stat()
@@ -71,9 +71,9 @@ events: Any = import_module("numba.core.event")
 
 
 class _SharedCache(_caching.FunctionCache):
-    """Numba's cache on disk with a lock, so that processes that start together write one after the other.
+    """Numba's cache on disk with a lock, so that concurrent processes write one after the other.
 
-    Numba reads the index of a loop, adds an entry, and writes it back. Two processes at once could lose an entry, or
+    Numba reads the index of a loop, adds an entry, and writes it back. Two concurrent processes could lose an entry, or
     make it point to the other's code.
     """
 
@@ -100,13 +100,13 @@ def _alone(folder: Path) -> Generator[None]:
 def compile_loop(function: Loop) -> Loop:
     """Return `function` as a loop that numba compiles at the first call from Python and caches on disk.
 
-    A loop that calls another one inlines its source. Without inlining, the version that a process loads first would
+    A loop that calls another loop inlines its source. Without inlining, the version that a process loads first would
     serve all callers. The last bits of a result would then depend on earlier calls, and on whether the process compiled
-    or loaded the code. A division by zero gives infinity: to raise would take a branch each time, and a sixth more time
-    to compile.
+    or loaded the code. A division by zero gives infinity: an exception would need a branch each time, and a sixth more
+    time to compile.
     """
     loop = _numba.njit(**_OPTIONS, inline="always")(function)
-    loop._cache = _SharedCache(function)  # noqa: SLF001 - what `cache=True` does, with a lock
+    loop._cache = _SharedCache(function)  # noqa: SLF001 - as `cache=True`, with a lock
     return cast("Loop", loop)
 
 
@@ -148,7 +148,7 @@ def _entry(loop: Callable[..., Result], kinds: tuple[object, ...], arguments: tu
 
 
 def _kind(argument: Any) -> object:  # noqa: ANN401 - an array, a number, or a tuple of both
-    """Return a key that distinguishes the types numba knows; it is faster to find than the types."""
+    """Return a key that distinguishes numba's types; it is faster to compute than the types."""
     kind: object = argument.__class__
     if kind is np.ndarray:
         return _array_kind(argument)

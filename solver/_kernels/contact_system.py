@@ -1,6 +1,6 @@
 """The linear system of contact on the skin, in displacement steps or, where the compliance is known, in forces.
 
-The module begins with the tributary length of each skin node.
+The first functions compute the tributary lengths of skin nodes.
 """
 
 import numpy as np
@@ -21,10 +21,10 @@ from solver.arrays import (
 RIGHT_SIDES = 4  # right-hand sides that are solved together
 ZERO = 1e-15  # a pivot below this, relative to the largest diagonal entry, is round-off
 
-# tributary lengths of an edge's first, middle and last node by the positions of the three: Simpson's rule
+# tributary lengths of an edge's first, middle and last node from the positions of the three: Simpson's rule
 _LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
 
-SHEAR_LIMITED_MU = 1.0  # with more friction, a node that comes into contact is first assumed to be shear-limited
+SHEAR_LIMITED_MU = 1.0  # with more friction, the first guess for a node that comes into contact is shear-limited
 
 
 @compile_loop
@@ -45,7 +45,7 @@ def tributary(x: Array, middle: Narrow, out: Array) -> None:
 def bounded_length(x: Array, skin: Skin, out: Array) -> None:
     """Fill `out` (k,) with the length of skin on which the traction bound acts at each node, `x` as for `tributary`.
 
-    Contact ends anywhere between two nodes. The bound acts on the whole length that a touching node stands for.
+    Contact ends anywhere between two nodes. The bound acts on the whole tributary length of a touching node.
     """
     tributary(x, skin.middle, out)
     for i in range(out.shape[0]):
@@ -65,7 +65,7 @@ def assemble_contact_system(
 
     Fills `matrix` (f f,), `right` (f, 4), the list of unknowns `free` (f,), and `steps` (2 k, 4) where contact
     conditions prescribe displacements. The columns are the step to equilibrium, and its derivatives with respect to
-    depth, mu and travel of the surface along +x. `length` is that of `bounded_length`.
+    depth, mu and travel of the surface along +x. `length` must come from `bounded_length`.
     """
     state, sense, _ = states
     free, steps, force = system.free, system.steps, body.force
@@ -77,7 +77,7 @@ def assemble_contact_system(
     for r in range(f):
         i: int = free[r] // 2
         right, sense_of_slip, drag = system.right[r], 0.0, 0.0
-        if state[i] == SLIP:  # T = s mu N, with the normal force N of the row below
+        if state[i] == SLIP:  # T = s mu N, with the normal force N from the row for y
             sense_of_slip, drag = sense[i], sense[i] * load.mu
         row, push = body.stiffness[free[r]], body.stiffness[2 * i + 1]
         right[0], right[1] = drag * force[2 * i + 1] - force[free[r]], 0.0
@@ -121,7 +121,7 @@ def prescribe(skin: Skin, state: Narrow, position: SkinPosition, system: Contact
 def add_bound(i: int, drag: float, middle: Narrow, position_of: Indices, system: ContactSystem, row: Array) -> None:
     """Add the traction bound to the `row` (f,) of node i: `drag` [MPa] times the node's length of skin.
 
-    `position_of` (2 k,) is the position of each skin unknown in the system, -1 where its step is prescribed.
+    `position_of` (2 k,) is the position of each skin unknown in the system, -1 for a prescribed step.
     """
     r, steps = position_of[2 * i], system.steps
     right = system.right[r]
@@ -143,7 +143,7 @@ def add_bound(i: int, drag: float, middle: Narrow, position_of: Indices, system:
 def solve(matrix: Array, right: Array, size: int) -> bool:
     """Solve the system of contact, `matrix` (size size,), in place for `right` (size, 4).
 
-    Returns False where a pivot is round-off. There is no pivoting: apart from its rows of contact and friction, the
+    Returns False where a pivot is round-off. Pivoting is unnecessary: apart from its rows of contact and friction, the
     matrix is the tangent of a stable body.
     """
     a = matrix[: size * size].reshape(size, size)
@@ -167,7 +167,7 @@ def solve(matrix: Array, right: Array, size: int) -> bool:
 
 @subroutine
 def eliminate_row(r: int, a: Array, right: Array, over: Array) -> None:
-    """Eliminate the rows before row r from it, four at a time; `over` (r,) holds their reciprocal pivots."""
+    """Eliminate the previous rows from row r, four at a time; `over` (r,) contains their reciprocal pivots."""
     row = a[r]
     p = 0
     while p + 4 <= r:
@@ -207,7 +207,7 @@ def assemble_force_system(
 
     Fills the arrays of `assemble_contact_system`. The unknowns are the normal forces on touching nodes, the tangential
     forces on sticking nodes, and the body's m rigid motions. `unloaded_step` (2 k + m,) is the step without contact.
-    `forces` (2 k + m, 4) is filled where they are known. The derivatives with respect to mu are not computed.
+    Known entries of `forces` (2 k + m, 4) are filled. The derivatives with respect to mu are not computed.
     """
     state, sense, _ = states
     pushes, f = list_forces(skin.held, states, load.tau, system, forces)

@@ -45,7 +45,7 @@ def displacement_gradient(ux: Array, uy: Array, gx: Array, gy: Array) -> tuple[f
 
 @subroutine
 def volume_growth(xx: float, xy: float, yx: float, yy: float) -> float:
-    """Return det F - 1 of a displacement gradient without cancellation: stiff tissue multiplies its error."""
+    """Return det F - 1 of a displacement gradient without cancellation, since stiff tissue multiplies its error."""
     return xx + yy + xx * yy - xy * yx
 
 
@@ -66,8 +66,8 @@ def gather(u: Array, nodes: Narrow, e: int, ux: Array, uy: Array) -> None:
 def assemble(u: Array, pressure: Array, new_tangent: bool, elements: ElementArrays, system: ElementSystem) -> float:
     """Fill the elements' `system` at displacements `u` (nodes, 2); return the least det F.
 
-    `pressure` (e, 3) are the pressure modes in the tangent (the linearised prediction); the forces follow from `u`
-    alone. Without `new_tangent`, the tangent of an earlier call is kept. Where det F is not positive, the system is
+    `pressure` (e, 3) are the pressure modes in the tangent (the linearised prediction); the forces depend on `u` alone.
+    Without `new_tangent`, the tangent of an earlier call is kept. Where det F is not positive, the system is
     incomplete.
     """
     system.force[:] = 0.0
@@ -197,7 +197,7 @@ def push_forward(gx: Array, gy: Array, matrix: Array, out: Array) -> None:
 
 @subroutine
 def sum_laplace(grad_x: Array, grad_y: Array, push: Array, out: Array) -> None:
-    """Fill `out` (9, 9) with the integrals of grad N_i . grad N_j times a modulus; `push` (q,) holds it by weight."""
+    """Fill `out` (9, 9) with integrals of grad N_i . grad N_j times a modulus; `push` (q,) is weight times modulus."""
     for i in range(9):
         for c in range(9):
             out[i, c] = 0.0
@@ -211,7 +211,7 @@ def sum_laplace(grad_x: Array, grad_y: Array, push: Array, out: Array) -> None:
 def sum_geometric(work: ElementWork) -> None:
     """Fill the products of deformed gradients: of each node's x, then its y, with those of all outer nodes.
 
-    For a row along x and a column along y, the tangent takes y of the row's node and x of the column's.
+    For a row along x and a column along y, the tangent takes y of the row's node and x of the column's node.
     """
     h, bend, by_x, by_y = work.h, work.bend, work.by_x, work.by_y
     for i in range(9):
@@ -239,7 +239,7 @@ def sum_dyads(e: int, stiffens: bool, work: ElementWork, system: ElementSystem) 
 
 @subroutine
 def eliminate_centre(e: int, work: ElementWork, system: ElementSystem) -> None:
-    """Eliminate an element's centre node, which no other element shares: fill the `system`, `left` and `right`."""
+    """Eliminate an element's centre node, which no other element shares; fill the `system`, `left` and `right`."""
     h, bend, d, dyads, by_x, by_y = work.h, work.bend, work.d, work.dyads, work.by_x, work.by_y
     left, right, even, inverse = work.left, work.right, work.laplace, system.condensed_inverse
     xx, yy, xy = even[8, 8] + dyads[16, 16], even[8, 8] + dyads[17, 17], dyads[17, 16]
@@ -271,7 +271,7 @@ def eliminate_centre(e: int, work: ElementWork, system: ElementSystem) -> None:
 
 @subroutine
 def write_tangent(e: int, work: ElementWork, system: ElementSystem) -> None:
-    """Fill an element's condensed tangent, lower half, and the derivatives of its volume modes by displacements."""
+    """Fill an element's condensed tangent, lower half, and the displacement derivatives of its volume modes."""
     left, right, dyads, even, tangent = work.left, work.right, work.dyads, work.laplace, system.tangent
     by_x, by_y, product = work.by_x, work.by_y, work.product
     for m in range(3):
@@ -293,7 +293,7 @@ def write_tangent(e: int, work: ElementWork, system: ElementSystem) -> None:
 
 @subroutine
 def add_forces(e: int, unknown: Narrow, f: Array, system: ElementSystem) -> None:
-    """Add an element's condensed forces to the system, and fill the share of `f` (18,) in the centre's displacement."""
+    """Add an element's condensed forces to the system, and fill the centre's displacement due to `f` (18,)."""
     recovery_matrix, inverse = system.recovery_matrix, system.condensed_inverse
     for m in range(2):
         recovery_matrix[e, m, 16] = inverse[e, m] * f[16] + inverse[e, m + 1] * f[17]
@@ -309,10 +309,10 @@ def add_forces(e: int, unknown: Narrow, f: Array, system: ElementSystem) -> None
 def advance(
     before: BodyState, step: Array, scale: float, after: BodyState, elements: ElementArrays, system: ElementSystem
 ) -> float:
-    """Fill the state `after` going `scale` times the `step` (n,); return the largest component of the full step.
+    """Fill the state `after` with `scale` times the `step` (n,); return the largest component of the full step.
 
-    The pressure is the linearised prediction at the end of the full step, approached by `scale`: the mixed integration
-    points of Magisano, Leonetti and Garcea (2017), Int. J. Numer. Meth. Eng. 109, 1237.
+    The pressure moves by the factor `scale` towards the linearised prediction at the end of the full step: the mixed
+    integration points of Magisano, Leonetti and Garcea (2017), Int. J. Numer. Meth. Eng. 109, 1237.
     """
     nodes, unknown, lame = elements.nodes, elements.unknown, elements.lame
     recovery_matrix, dilate, volume = system.recovery_matrix, system.dilate, system.volume
@@ -345,9 +345,9 @@ def advance(
 def overstress(u: Array, tensor: Array, elements: ElementArrays, force: Array, tangent: Array, points: Array) -> None:
     """Fill `force` (e, 18) and `tangent` (e, 18, 18) of W = 1/2 J^-2/3 T:C at displacements `u` (nodes, 2).
 
-    `tensor` (e, q, 4) is T: xx, yy, xy, zz [MPa]. Both are ordered as in `ElementWork`. The tangent is filled only
-    where the column's node does not come after the row's. `points` (4, 9) is memory for F T and F^-T times the
-    gradients.
+    `tensor` (e, q, 4) is T: xx, yy, xy, zz [MPa]. `force` and `tangent` are ordered as in `ElementWork`. The tangent is
+    filled only where the column's node does not come after the row's. `points` (4, 9) is memory for F T and F^-T times
+    the gradients.
     """
     ux, uy = np.empty(9), np.empty(9)
     mx, my, hx, hy = points[0], points[1], points[2], points[3]

@@ -2,7 +2,7 @@
 
 The n unknowns are numbered in elimination order, the m of the skin last. A part's front is a symmetric matrix of its
 inner unknowns (k, eliminated here) and its border (b, passed on to the parent). The inner rows of its factor U = D L^T
-are kept: (k, k + b) numbers, upper half. The border's Schur complement (b, b) stays in `waiting` for the parent.
+are stored: (k, k + b), upper half. The border's Schur complement (b, b) stays in `waiting` for the parent.
 """
 
 import numpy as np
@@ -18,8 +18,8 @@ def eliminate(tangent: Array, plan: SymbolicFactorization, factors: Array, waiti
     """Fill `factors` and the skin's condensed stiffness `skin` (m, m); return the sign of the pivots.
 
     It is UNSOLVABLE where a pivot is zero, DEFINITE where all are positive, as in a stable body, else INDEFINITE.
-    `tangent` (e, 16, 16) holds the element tangents, lower half. `plan` gives the sizes of `factors` and `waiting`.
-    There is no pivoting: while the skin is held, only pressure on the way to an equilibrium can make the inside
+    `tangent` (e, 16, 16) are the element tangents, lower half. `plan` gives the sizes of `factors` and `waiting`. There
+    is no pivoting: while the skin is held, only the pressure of iterations before equilibrium can make the inside
     unstable.
     """
     inner, border, factor_at, wait_at = plan.inner, plan.border, plan.factor_at, plan.wait_at
@@ -90,8 +90,8 @@ def _add_child(below: Array, where: Narrow, ends: Narrow, top: Array, complement
 def _factorise(top: Array, complement: Array) -> bool:
     """Factorise a front in place, upper halves only; return False where a pivot is zero.
 
-    The inner rows `top` (k, k + b) become their factor, and `complement` (b, b) the Schur complement. Rows are finished
-    and updated two at a time, by four finished rows at a time. That keeps most numbers in registers and the nearest
+    The inner rows `top` (k, k + b) become their factor, and `complement` (b, b) the Schur complement. Rows are updated
+    and finished two at a time, by four finished rows at a time, which keeps most data in registers and the nearest
     cache. Of two rows updated together, the entry of the second before its diagonal has no meaning.
     """
     k, b = top.shape[0], complement.shape[0]
@@ -187,7 +187,7 @@ def back_substitute_part(p: int, condensed_force: Array, factors: Factors, out: 
     for j in range(b):
         near[k + j] = out[beyond[j]]
     i = k
-    while i >= 2:  # two rows at a time: they share the reads of `solution`
+    while i >= 2:  # two rows at a time share the reads of `solution`
         i -= 2
         upper, lower, solution = top[i, i:], top[i + 1, i:], near[i:width]
         x, y = condensed_force[first + i], condensed_force[first + i + 1]
