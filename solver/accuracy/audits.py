@@ -70,7 +70,7 @@ def audits(
 
 
 def force_residuals(scene: Scene, normal: float, tangential: float) -> dict[str, float]:
-    """Return the relative errors of a state's forces [N/mm] against those that `scene` prescribes, if it does.
+    """Return the relative errors of a state's forces [N/mm] against those that `scene` prescribes; empty without any.
 
     `normal_force_missed` is relative to the given force, `drag_missed` to the friction limit under it. Raises
     NotConverged where either exceeds `FORCE_RESIDUAL`.

@@ -1,4 +1,4 @@
-"""Estimate the overstress that relaxing tissues would still hold once an elastic finger slides steadily.
+"""Estimate the overstress that relaxing tissues would still carry once an elastic finger slides steadily.
 
 The load path is marched on a coarse mesh in few steps: the press, then a slide as long as the skin's displacement along
 the surface, at whose end all of an elastic finger slips. Few steps suffice, since a step is exact for a strain that
@@ -22,7 +22,7 @@ from solver.prediction import Prediction
 from solver.scene import Scene
 from solver.scene.tables import Relaxation, SceneError
 
-_MARGIN = 4.0  # height of the undeformed skin up to which contact is considered, relative to the indentation
+_MARGIN = 4.0  # `Sizing.margin`: undeformed skin lower than twice the indentation may touch
 # Elements per tip radius, and load steps of the press and of the slide each. Compared with 16 steps at a fineness of 5,
 # estimates of 42 small-strain scenes differ by at most 4 % of the SED. Compared with 8 at a fineness of 4, those of 60
 # finite-strain scenes differ by 5 % of it or a tenth of the estimate, four by a sixth: but the weights are assumed.
@@ -39,7 +39,7 @@ class ResidualOverstress:
 
 
 def relaxing_scene(scene: Scene) -> Scene | None:
-    """Return the scene with relaxing tissues: with its Prony series, or with the literature's and its moduli long-term.
+    """Return the scene with relaxing tissues: its Prony series, or the literature's with its moduli as long-term ones.
 
     Bulk moduli do not relax. Returns None for tissue too compressible for that, or too stiff for a scene.
     """

@@ -196,7 +196,7 @@ class CondensedFinite:
         return self.body.mesh.nodes[skin] + u[skin]
 
     def linearise(self, u: Array, pressure: Array) -> bool:
-        """Assemble and factorise the tangent at a state; return False where that is inside out or singular."""
+        """Assemble and factorise the tangent at a state; return False where it is inside out or singular."""
         self.equilibrium = None
         if not self.assemble(u, pressure) > 0.0:
             return False

@@ -98,7 +98,7 @@ class LinearElimination:
         return force, of_centres
 
     def skin_load(self, load: CondensedLoad) -> Array:
-        """Return a load condensed to the skin (2 k,), 0 where that is held."""
+        """Return a load condensed to the skin (2 k,), 0 where the skin is held."""
         mesh = self.elastic.mesh
         return np.where(mesh.driven[mesh.skin].ravel(), 0.0, -load[0][len(load[0]) - len(self.stiffness) :])
 

@@ -57,7 +57,7 @@ def _check_arrays(mesh: Mesh) -> None:
 
 
 def _stray(mesh: Mesh) -> Flags:
-    """Return which nodes (n,) belong to no element."""
+    """Return flags (n,) of the nodes that belong to no element."""
     out = np.ones(len(mesh.nodes), bool)
     out[mesh.elements] = False
     return out

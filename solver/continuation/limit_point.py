@@ -21,12 +21,12 @@ from solver.scene import Scene
 from solver.scene.tables import SHALLOW
 
 FINENESS = 7.0  # elements per tip radius of both meshes, except at a fold
-_MARGIN = 6.0  # height of the undeformed skin up to which contact is considered, relative to the indentation
+_MARGIN = 6.0  # `Sizing.margin`: undeformed skin lower than 2.5 times the indentation may touch
 
 
 @dataclass(frozen=True, slots=True)
 class LimitControl:
-    """Which states may begin or end a branch: least stretches of the skin, and fractions."""
+    """Criteria for states that begin or end a branch: least stretches of the skin, and fractions."""
 
     resolved_stretch: float = 0.66  # above it, states of the coarse mesh agree with those of the fine one
     sound_stretch: float = 0.65  # from it, other states may start here: neo-Hookean surfaces fold at 0.54

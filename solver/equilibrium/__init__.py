@@ -36,7 +36,7 @@ EQUILIBRIUM, BY_DEPTH, BY_FRICTION, BY_TRAVEL = 0, 1, 2, 3  # columns of Newton.
 
 @dataclass(frozen=True, slots=True)
 class NewtonControl:
-    """When the iterations halve a step, keep a tangent or stop; lengths are relative to the length scale of the body.
+    """Criteria to halve a step, keep a tangent or stop; lengths are relative to the length scale of the body.
 
     Halving or doubling any of these changed no state of eighteen slides, presses and load paths at finite strain by
     more than 6e-10, and the number of tangents by 3 % at most. Without keeping tangents there are 5 % more.

@@ -227,7 +227,7 @@ def _before_folding(finger: LinearFinger, instants: Sequence[Instant]) -> tuple[
 
 
 def place_of_least_stretch(finger: LinearFinger, state: EquilibriumState, depth: float) -> tuple[float, float]:
-    """Return the position [mm] of most compressed tissue in the world frame: the corner with the least stretch."""
+    """Return the position [mm] of the most compressed tissue, the corner with the least stretch, in the world frame."""
     displacement = finger.displacement(state)
     mesh = finger.geometry.mesh
     corner = int(np.argmin(finger.body.stretches(displacement)[0]))

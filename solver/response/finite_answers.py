@@ -37,8 +37,8 @@ from solver.response.answer import (
 from solver.scene import Scene
 
 NEAR_SLIDE = 0.98  # ratio of drag to friction limit from which contact lies where it lies in full slip
-CONTACT_MARGIN = 3.0  # height of the undeformed skin up to which contact is considered: `Sizing.margin`
-WIDER = 6.0  # this margin where contact reaches the end of that skin
+CONTACT_MARGIN = 3.0  # `Sizing.margin`: undeformed skin lower than 1.75 times the indentation may touch
+WIDER = 6.0  # margin where contact reaches the end of that skin: 2.5 times the indentation
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -278,7 +278,7 @@ _FINENESS = {"small": 4.0, "finite": 2.7}  # meshes on which the response is acc
 MARGIN = {
     "small": 4.0,
     "finite": 6.0,
-}  # height of undeformed skin up to which contact is considered, relative to the indentation
+}  # `Sizing.margin`: undeformed skin lower than 2 or 2.5 times the indentation may touch
 # A nine-node element as four quadrilaterals, and the local coordinates of their midpoints.
 QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
 MIDPOINTS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])

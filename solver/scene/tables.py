@@ -355,7 +355,7 @@ USUAL_TOLERANCE = 0.003  # a tenth of the SED's range over the published slipper
 
 @dataclass(frozen=True, slots=True)
 class Solve(Table):
-    """How to solve the scene.
+    """Options of the solution.
 
     Evidence: "quick" follows from the solution, "estimated" also marches a load path for the residual overstress,
     "measured" solves the scene again in several ways.
