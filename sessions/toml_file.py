@@ -98,7 +98,7 @@ def tables_in(text: str, where: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         number = _COMMA.search(text)
-        comma = f"; in {number[1]} write the fraction behind a point" if number else ""
+        comma = f"; use a decimal point in {number[1]}" if number else ""
         raise SettingsError(f"{where}: this is not TOML: {error}; correct it there{comma}") from error
     except RecursionError as error:
         raise SettingsError(f"{where}: lists or tables are nested too deep; write it with fewer brackets") from error

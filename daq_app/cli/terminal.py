@@ -137,7 +137,7 @@ class Terminal:
             event = self._prompt.answer(number)
         if event is None:
             due = PAUSED if self._paused else _HELP if self._prompt is None else self._prompt.question
-            nothing = f"'{line}' means nothing now" if line else "Nothing is waiting for Enter now"
+            nothing = f"'{line}' is not valid now" if line else "Nothing is waiting for Enter now"
             doubt = ": it is {} or {}".format(*meanings) if (meanings := two_meanings(line)) else ""
             self._print(f"{nothing}{doubt}. {due}")
         return event

@@ -284,7 +284,7 @@ class TrialsColumn(QWidget):
         self._tokens, self._ask = tokens, ask
         self.list = row_list(tr("trials"))
         self.list.currentRowChanged.connect(self._choose)
-        self.responses = choice(tr("quantity that is held against the score"))
+        self.responses = choice(tr("quantity compared with the score"))
         for response in (shown_response(quantity.name) for quantity in QUANTITIES):
             self.responses.addItem(f"{tr(response.label)} [{response.unit}]", response.name)
         self.responses.activated.connect(lambda: respond(m.Respond(self.responses.currentData())))

@@ -55,7 +55,7 @@ KEYS = (
     Key("F5", "pilot", tr_noop("pilot the protocol of the page with simulated hand and answers")),
     Key("F6", "subject", tr_noop("show the subject's window and go to it")),
     Key("F7", "preview", tr_noop("preview every page that the subject will see, by this protocol and language")),
-    Key("Ctrl+M", "ruler", tr_noop("hold the subject's line against a ruler")),
+    Key("Ctrl+M", "ruler", tr_noop("measure the subject's line with a ruler")),
     Key("Ctrl+O", "open", tr_noop("look at a recorded session: strokes, predictions, report, exports")),
     Key("F1", "keys", tr_noop("show or hide these keys")),
     Key("Esc", "leave", tr_noop("leave what is being typed, or these keys")),

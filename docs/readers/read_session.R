@@ -4,7 +4,7 @@
 #   Rscript read_session.R P07-csv
 #
 # session$readings, $events, $trials, $answers, $strokes, $friction, $flaws and, where stored, $predictions are data frames;
-# units stand at the end of a column's name, README.md of the export tells each of them. The file session.h5 of a session can
+# a column's name ends with its unit, and README.md of the export lists each. The file session.h5 of a session can
 # be read too where Bioconductor's rhdf5 is installed: rhdf5::h5read("session.h5", "readings/raw"). The JSON text of event i
 # is rawToChar(as.raw(data[(c(0, end)[i] + 1):end[i]])), with data and end from "events/data" and "events/data_end".
 

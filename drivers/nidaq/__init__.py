@@ -124,7 +124,7 @@ class _TaskLink:
             if low > -RANGE or high < RANGE or channels.ai_term_cfg != differential:
                 self.close()
                 raise SetupError(
-                    f"-{RANGE:g} to {RANGE:g} V was asked of {device} and it took {low:g} to {high:g} V, "
+                    f"-{RANGE:g} to {RANGE:g} V was requested from {device}, which set {low:g} to {high:g} V, "
                     f"{channels.ai_term_cfg}; use a device with six differential inputs of that range"
                 )
             self.gauges = f"six differential pairs from ai0 on, {low:g} to {high:g} V, as read back"

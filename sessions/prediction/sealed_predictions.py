@@ -78,7 +78,7 @@ def sealed_sentence(recording: Recording, current: Sequence[Mapping[str, Any]]) 
     agree = len(numbers) == len(current) and all(
         _agree(sealed.get(name), row[name]) for sealed, row in rows for name in SEAL_NUMBERS
     )
-    comparison = "the predictions shown are those" if agree else "the predictions shown here are others, made since"
+    comparison = "the predictions shown are those" if agree else "the predictions shown were made later and differ"
     return f"Predictions were {time_text} {_how_blind(recording, blinded=bool(seal.get('blinded')))}; {comparison}."
 
 

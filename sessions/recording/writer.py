@@ -126,7 +126,7 @@ class SessionWriter:
             raise RecordingError(f"{folder} is sealed: nothing is added to it; begin a new session")
         fold_log(folder, Recording.open(folder).events)
         path = folder / schema.LIVE_FILE
-        with name_failure(RecordingError, f"{folder} cannot be gone on in"):
+        with name_failure(RecordingError, f"the recording in {folder} cannot be continued"):
             if reserve:
                 take_reserve(folder, reserve)
         connection = sqlite3.connect(path, isolation_level=None, timeout=0.5)
@@ -140,7 +140,7 @@ class SessionWriter:
         except sqlite3.Error as error:
             connection.close()
             release_reserve(folder)
-            raise RecordingError(f"{path} cannot be gone on with ({error}); {remedy(error)}") from error
+            raise RecordingError(f"the recording in {folder} cannot be continued ({error}); {remedy(error)}") from error
         writer.acknowledged = Acknowledged(writer.reading_count, writer._event_count, clock.now_ns())
         return writer
 

@@ -206,7 +206,7 @@ def _prediction_sentence(experiment: Experiment, quantity: ShownResponse, limits
         sentence += f" is {digits(low, decimals)}{unit}"
     fit = experiment.score_relation
     if fit is None:
-        return f"{sentence}; there are no scores to hold it against."
+        return f"{sentence}; there are no scores to compare it with."
     if fit.pearson is None:
         return f"{sentence}; no correlation with the scores: {fit.reason}."
     r = f"{correlation(fit.pearson)}{ends_of(fit)}"

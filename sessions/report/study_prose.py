@@ -56,8 +56,8 @@ def summary(study: StudyFindings) -> list[str]:
         sentences.append(
             f"The µ of {friction.strokes} strokes was estimated with a median error of "
             f"{digits(100 * friction.median_error, 2)} %, {digits(100 * friction.worst_error, 2)} % at worst; "
-            f"{friction.covered} of {friction.intervals} intervals hold the true µ, and those of one subject hold or "
-            "miss together, for the error of a transducer's calibration is one for all its strokes."
+            f"{friction.covered} of {friction.intervals} intervals hold the true µ; those of one subject hold or miss "
+            "it together, since one calibration error affects all its strokes."
         )
     return sentences
 
@@ -122,10 +122,10 @@ def subject_facts(study: StudyFindings) -> list[Fact]:
 
 def exclusion_sentences(study: StudyFindings) -> list[str]:
     """Return a sentence for each exclusion from the results, with its author and reason."""
-    sentences = [f"Session {name} could not be read, and nothing of it counts: {text}." for name, text in study.failed]
+    sentences = [f"Session {name} could not be read and is not counted: {text}." for name, text in study.failed]
     sentences += [f"Session {name} is {STILL_BLINDED}." for name in study.blinded]
     sentences += [
-        f"Session {session} holds the same recording as {first}, to the last reading and event, and counts nothing."
+        f"Session {session} holds the same recording as {first}, to the last reading and event, and is not counted."
         for session, first in study.copies
     ]
     sentences += [
@@ -142,7 +142,7 @@ def _decision_sentences(study: StudyFindings, *, leaving_out: bool) -> list[str]
     return [f"Session {name}: {full_stop(s)}" for name, s in decisions if (" is left out: " in s) == leaving_out]
 
 
-NO_TRIAL = "has no trial of an experiment, as an imported table has none, and counts nothing"
+NO_TRIAL = "has no trial of an experiment, as an imported table has none, and is not counted"
 
 
 def remarks(study: StudyFindings) -> list[str]:
@@ -268,7 +268,7 @@ def reproduction_facts(study: StudyFindings) -> list[Fact]:
         Fact("τ max", model.tau_reading),
         Fact("contact area", study.options.area.sentence),
         Fact("many paths", study.options.paths),
-        Fact("held against scores", BY_NAME[study.response].label, BY_NAME[study.response].meaning),
+        Fact("compared with scores", BY_NAME[study.response].label, BY_NAME[study.response].meaning),
     ]
     software = by_key((", ".join(map(" ".join, visit.made_by.items())), visit.session) for visit in study.visits)
     facts += [Fact("computed with", text, f"{plural(len(sessions), 'session')}") for text, sessions in software.items()]

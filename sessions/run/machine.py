@@ -47,9 +47,7 @@ def advance(state: State, event: steps.Event) -> Step:
             commands = (*_discard_commands(state, cause), steps.EndSession(cause, complete=False))
             return Ended(cause, complete=False), commands
         case _, steps.Note(text):
-            return state, () if text.strip() else (
-                steps.Refuse("an empty note says nothing: write what is to be kept"),
-            )
+            return state, () if text.strip() else (steps.Refuse("an empty note is not stored: write a text"),)
         case _, steps.Pause() | steps.Resume() | steps.RestOver():
             return _pause_or_resume(state, event)
         case _, steps.Redo(reason) | steps.Skip(reason) if not reason.strip():
@@ -341,4 +339,4 @@ def _refusal(state: State, event: steps.Event) -> steps.Refuse:
         Closing: "every trial is done",
         Ended: "the session has ended",
     }
-    return steps.Refuse(f"{steps.EVENT_NAMES[type(event)]} means nothing now: {situations[type(state)]}")
+    return steps.Refuse(f"{steps.EVENT_NAMES[type(event)]} is not possible now: {situations[type(state)]}")

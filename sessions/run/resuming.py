@@ -91,13 +91,13 @@ def check_same_transducer(original: TransducerInfo | None, present: TransducerIn
             f" {present.serial}; connect the first, or begin a new session"
         )
     if calibration_hash(present.calibration) != calibration_hash(original.calibration):
-        raise RecordingError(f"transducer {present.serial} is calibrated otherwise than before; begin a new session")
+        raise RecordingError(f"transducer {present.serial} has another calibration than before; begin a new session")
     # The rate of a device without a counter is measured on opening, to a few per cent.
     tolerance = SPREAD if np.isnan(original.counter_rate) else 1e-3
     if not np.isclose(present.rate, original.rate, rtol=tolerance, equal_nan=True):
         raise RecordingError(
             f"transducer {present.serial} gives {present.rate:g} readings a second, and gave {original.rate:g};"
-            " set it as it was"
+            " restore its settings"
         )
 
 

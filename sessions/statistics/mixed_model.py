@@ -279,10 +279,10 @@ def mixed_model(
     if varies < 2:
         return f"{names[1]} varies between the scores of {varies} of {count} subjects, and it takes two"
     if fits_exactly(np.hstack([indicator_columns(subjects), columns[:, 1:] / scale[1:]]), np.array(score, np.float64)):
-        return "all scores lie on the line but for round-off: there is nothing to tell an error from"
+        return "all scores lie on the line but for round-off: no residuals remain to estimate an error"
     fit = reml_fit(np.array(score, np.float64), columns / scale, np.array(subjects), random_terms=2)
     if fit.exact:
-        return "each subject's scores lie on a line of their own: there is nothing to tell an error from"
+        return "each subject's scores lie on a line of their own: no residuals remain to estimate an error"
     level_sd, slope_sd = (np.sqrt(np.diag(fit.among)) / scale[:2]).tolist()
     residual_dof = max(len(score) - len(names) - (count - 1) - (varies - 1), 1)
     dofs = [count - 1, varies - 1, *([residual_dof] * (len(names) - 2))]

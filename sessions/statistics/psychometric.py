@@ -78,7 +78,7 @@ def psychometric(levels: Sequence[Level]) -> Psychometric:
         return replace(none, reason=f"it takes {LEAST_LEVELS} comparisons of different friction")
     fit = _ProfileLikelihood(levels)
     if fit.flat:
-        return replace(none, reason="answers hardly go with friction: the JND lies beyond all comparisons")
+        return replace(none, reason="answers hardly depend on friction: the JND is beyond all comparisons")
     slope = fit.estimate(_SLOPE)
     return replace(
         none,

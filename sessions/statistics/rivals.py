@@ -255,7 +255,7 @@ def _deviance(name: str, trials: Sequence[RivalTrial]) -> float | str:
         return "too few subjects, surfaces or trials for a model of five parameters"
     x, y = [trial.values[name] for trial in trials], [trial.score for trial in trials]
     deviance = crossed_deviance(subjects, surfaces, y, x)
-    return "it does not vary, or the scores leave nothing to tell an error from" if deviance is None else deviance
+    return "it does not vary, or no residuals remain to estimate an error" if deviance is None else deviance
 
 
 def _because(rival: Rival, **reasons: str | None) -> Rival:

@@ -201,7 +201,7 @@ def no_interval(mean: Average) -> str | None:
     """Return why a mean has no interval; None if it has one."""
     if mean.low is not None:
         return None
-    return "one subject alone has no interval" if mean.n == 1 else "no interval: subjects who are all alike tell none"
+    return "one subject alone has no interval" if mean.n == 1 else "no interval: all subjects have the same value"
 
 
 def indicator_columns(groups: Sequence[str] | Sequence[int] | Array | Indices) -> Array:

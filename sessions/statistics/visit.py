@@ -62,7 +62,7 @@ def exclusion_of(exclusions: tuple[Exclusion, ...], subject: str, descriptor: st
 
 
 FORM = 12  # version of rows; stored rows of another version are computed again
-STILL_BLINDED = "still blinded, and counts nothing until 'daq-app unblind' opens the key"
+STILL_BLINDED = "still blinded, and is not counted until 'daq-app unblind' opens the key"
 NO_INTERVAL = "intervals of the SED were not asked for"
 
 

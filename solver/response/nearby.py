@@ -83,7 +83,7 @@ def skin_derivatives(newton: Newton, state: EquilibriumState) -> Array:
     """
     load, size = state.load, len(state.state)
     if load.sense == 0 or (state.state == STICK).any():
-        raise ValueError("a state with sticking points depends on the way to it, which its tangent does not know")
+        raise ValueError("a state with sticking points depends on its load path, which its tangent does not know")
     if not newton.linearise(state, load, newton.skin_x):
         raise ValueError("the state has no tangent")
     x = np.ascontiguousarray(state.skin_positions(newton.condensed)[:, 0])

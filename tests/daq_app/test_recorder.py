@@ -128,7 +128,7 @@ def test_what_is_not_for_now_is_refused_with_a_sentence(whole):
     first, second = desk.of(Failed)
     assert (first.request, first.sentence[:24]) == ("Tare", "no transducer is connect")
     assert (second.request, second.sentence[:20]) == ("Tare", "a session is running")
-    assert "a mounted stimulus means nothing now" in desk.of(Refuse)[0].sentence
+    assert "a mounted stimulus is not possible now" in desk.of(Refuse)[0].sentence
 
 
 @pytest.mark.skipif(not Path("/proc/net/udp").exists(), reason="looks sockets up where Linux tells of them")

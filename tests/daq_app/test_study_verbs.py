@@ -62,7 +62,7 @@ def test_a_session_that_is_still_blinded_is_named_apart_from_those_that_cannot_b
     assert document["study"]["blinded"] == ["P01_forces", "P01_scores", "P02_scores"]
     assert run(["study", str(study), "--out", str(tmp_path / "out")]) == 3
     text = capsys.readouterr().out
-    assert "Session P01_scores is still blinded, and counts nothing until 'daq-app unblind' opens the key." in text
+    assert "Session P01_scores is still blinded, and is not counted until 'daq-app unblind' opens the key." in text
     assert "No trial counts." in text
     assert "could not be read" not in text
 

@@ -94,7 +94,7 @@ def test_a_choice_of_two_names_both_stimuli_and_takes_no_third():
 def test_a_number_that_may_be_a_thousand_is_asked_for_again():
     events, output = read_line(AskNumber(TRIAL, "How rough?"), "1,000")
     assert events == ()
-    assert "'1,000' means nothing now: it is 1000 or 1.000. How rough?" in output
+    assert "'1,000' is not valid now: it is 1000 or 1.000. How rough?" in output
 
 
 def test_enter_reports_a_stroke_only_where_no_transducer_feels_it():

@@ -160,7 +160,7 @@ def test_a_decision_that_fits_no_trial_is_told_as_such():
 def test_scores_that_are_all_the_same_leave_a_reason_and_no_model():
     flat = [replace(v, rows=tuple(replace(row, score=50.0) for row in v.rows)) for v in VISITS]
     findings = pool_visits(flat)
-    assert "nothing to tell an error from" in findings.descriptors[0].on_index
+    assert "no residuals remain to estimate an error" in findings.descriptors[0].on_index
     page = study_page(findings, "x")
     assert "No mixed model of stickiness on SED, stickiness on index" in page
 
@@ -254,7 +254,7 @@ def test_a_recording_without_trials_is_told_to_count_nothing_and_not_to_have_end
     foreign = replace(VISITS[0], session="foreign", rows=(), complete=False)
     (sentence,) = (one for one in remarks(pool_visits([foreign, *VISITS[1:]])) if "foreign" in one)
     assert sentence.startswith("Session foreign has no trial of an experiment")
-    assert sentence.endswith("counts nothing.")
+    assert sentence.endswith("is not counted.")
 
 
 SENSE = {"small": 1.0, "finite": -1.0}  # of the SED along a path

@@ -165,8 +165,8 @@ def test_an_observer_who_says_the_opposite_has_the_same_pse_and_jnd():
     [
         ([], "takes 3 comparisons"),
         ([Level(-0.2, 2, 10), Level(0.2, 8, 10)], "takes 3 comparisons"),
-        ([Level(x, 5, 10) for x in SIX], "hardly go with friction"),
-        ([Level(x, 10, 10) for x in SIX], "hardly go with friction"),
+        ([Level(x, 5, 10) for x in SIX], "hardly depend on friction"),
+        ([Level(x, 10, 10) for x in SIX], "hardly depend on friction"),
     ],
 )
 def test_answers_that_fix_no_function_say_why(levels, reason):

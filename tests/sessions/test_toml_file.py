@@ -182,8 +182,8 @@ def test_a_wrong_scene_file_is_refused_with_its_line(tmp_path, old, new, sentenc
 @pytest.mark.parametrize(
     ("old", "new", "hint"),
     [
-        ("mu = 0.67", "mu = 0,67", "; in 0,67 write the fraction behind a point"),
-        ("mu = 0.67", "mu = 0,67  # of the sample", "; in 0,67 write the fraction behind a point"),
+        ("mu = 0.67", "mu = 0,67", "; use a decimal point in 0,67"),
+        ("mu = 0.67", "mu = 0,67  # of the sample", "; use a decimal point in 0,67"),
         ("mu = 0.67", "mu = 0.67\nmu = 0.67 # not 0,67", ""),
         ("[friction]", "title = '0,67\n[friction]", ""),
     ],

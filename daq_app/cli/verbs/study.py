@@ -4,7 +4,7 @@ Results are kept by the content they were made of, in OUT/results: what was comp
 Ctrl-C loses nothing that was done. A session that cannot be read is named and left out. Subjects are left out by
 decisions in FOLDER/exclusions.toml ([[exclude]] subject, why, who, and descriptor for one alone).
 With --power no session is needed: simulated studies say how many subjects and surfaces one needs.
-With --synthetic a study of ten simulated subjects is made first, and its ground truth is held against the estimates.
+With --synthetic a study of ten simulated subjects is made first, and its ground truth is compared with the estimates.
 """
 
 import argparse

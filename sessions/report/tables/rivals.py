@@ -104,7 +104,7 @@ def _verdict(name: str, model: str, rivals: Sequence[Rival]) -> str:
     if sides["neither"]:
         sentence += (
             "; they" if sentence else "the scores"
-        ) + f" tell no difference between the {model} and {_rival_names(sides['neither'])}"
+        ) + f" do not distinguish the {model} from {_rival_names(sides['neither'])}"
     return f"On {name}, {sentence}."
 
 

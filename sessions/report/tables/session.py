@@ -182,7 +182,7 @@ def score_cells(mean: MeanScore) -> Row:
 
 def spread_cell(sd: float | None, n: int, as_text: Format, reason: str | None) -> Cell:
     """Return the standard deviation of n values over its interval."""
-    return estimate_cell(sd, as_text, reason, sd_interval(sd, n) if sd else None, "all are alike")
+    return estimate_cell(sd, as_text, reason, sd_interval(sd, n) if sd else None, "all are the same")
 
 
 def answer_tables(report: Report) -> tuple[Table | None, ...]:

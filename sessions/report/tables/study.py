@@ -189,8 +189,8 @@ def _forces(study: StudyFindings) -> Table | None:
     return _table(study, "table-forces", "study-forces", columns, rows)
 
 
-_NOT_WITHIN = "no interval: no two subjects scored every surface, or they differ alike between surfaces"
-_NOT_OF_PEOPLE = "no interval of fewer than three subjects, of some who are all alike, or of a perfect r"
+_NOT_WITHIN = "no interval: no two subjects scored every surface, or their differences between surfaces are the same"
+_NOT_OF_PEOPLE = "no interval for fewer than three subjects, for identical ones, or for a perfect r"
 _NO_STROKE = "no subject's stroke gives this number"
 
 

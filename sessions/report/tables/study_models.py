@@ -69,7 +69,7 @@ def missing_scores(study: StudyFindings) -> list[str]:
         counts = f"{findings.descriptor} has {subjects} and {surfaces}"
         if not findings.scores:
             continue
-        of_order = "it takes two subjects who scored each of three surfaces or more, not all alike"
+        of_order = "it takes two subjects who scored each of three surfaces or more, not all the same"
         of_intervals = "they take two subjects who scored each of two surfaces"
         of_pairs = "it takes three subjects who scored both, not all with the same difference"
         index_pairs = {(difference.low_index, difference.high_index) for difference in findings.differences}
@@ -153,7 +153,7 @@ def trials_table(study: StudyFindings) -> Table | None:
 
 def _exclusion_note(study: StudyFindings, visit: Visit, descriptor: str) -> str:
     if visit.session in dict(study.copies):
-        return " (a copy: counts nothing)"
+        return " (a copy: not counted)"
     exclusion = exclusion_of(study.excluded, visit.subject, descriptor)
     return "" if exclusion is None else " (left out of every number above)"
 

@@ -50,7 +50,7 @@ def test_it_says_who_it_is_and_at_which_rate_it_was_set(library, address):
 
 def test_a_device_that_takes_another_range_than_asked_is_refused(library, address):
     library.range = (-5.0, 5.0)
-    with pytest.raises(SetupError, match="-10 to 10 V was asked of Dev1 and it took -5 to 5 V"):
+    with pytest.raises(SetupError, match="-10 to 10 V was requested from Dev1, which set -5 to 5 V"):
         open_nidaq(address, RealClock(), Deadline.for_opening())
 
 
