@@ -91,7 +91,7 @@ def _dispatch(arguments: list[str]) -> int:
         print("daq-app", software_versions()["daq-app"])
         return DONE
     if name not in VERBS:
-        return _report(f"there is no verb '{name}': 'daq-app --help' lists them", WRONG)
+        return _report(f"there is no verb '{name}': 'daq-app --help' lists the verbs", WRONG)
     verb = verb_module(name)
     parser = parser_of(name, verb)
     if _HELP & {*verb_arguments}:
@@ -121,7 +121,7 @@ def _overview() -> argparse.ArgumentParser:
         prog="daq-app",
         usage="daq-app VERB [options]",
         description="Friction psychophysics: the experiment, the transducer, the finite-element finger.",
-        epilog=f"verbs:\n{verbs}\n\n'daq-app VERB --help' explains one and shows an example. "
+        epilog=f"verbs:\n{verbs}\n\n'daq-app VERB --help' explains a verb and shows an example. "
         "'daq-app' alone opens the window, 'daq-app window SESSION' a session in it. "
         "'daq-app --version' prints the program's version.\n\n"
         "exit codes: 0 done, 1 could not be done, 2 wrong command line or value in a TOML file, "
@@ -143,7 +143,7 @@ def parser_of(name: str, verb: ModuleType) -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     verb.add_arguments(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON document on stdout, and nothing else there")
+    parser.add_argument("--json", action="store_true", help="print one JSON document on stdout, and nothing else")
     parser.add_argument("--debug", action="store_true", help="show the traceback of a failure")
     return parser
 
@@ -165,8 +165,8 @@ def _failure(error: Exception) -> tuple[str, int]:
         return f"a name is not UTF-8 ({around!r}): rename the file or folder and run this again", FAILED
     if isinstance(error, ModuleNotFoundError) and error.name and error.name.partition(".")[0] not in OUR_OWN:
         package = error.name.partition(".")[0]
-        return f"the Python package {package} is not installed; 'pip install daq-app' brings all that is needed", FAILED
-    return f"unexpected {type(error).__name__} ({sentence}); run again with --debug and report what it shows", FAILED
+        return f"the Python package {package} is not installed; 'pip install daq-app' installs it", FAILED
+    return f"unexpected {type(error).__name__} ({sentence}); run again with --debug and report the output", FAILED
 
 
 def _report(sentence: str, code: int) -> int:

@@ -93,7 +93,7 @@ def add_session(parser: argparse.ArgumentParser) -> None:
 def add_visit(parser: argparse.ArgumentParser, further: str = "") -> None:
     """Declare a folder of a session or of a study, and --subject, which chooses a visit; `further` extends its help."""
     parser.add_argument("session", type=Path, metavar="SESSION|STUDY", help="the folder of a session or of a study")
-    parser.add_argument("--subject", metavar="CODE", help=f"of a study: whose visit with forces{further}")
+    parser.add_argument("--subject", metavar="CODE", help=f"of a study: subject of the visit with forces{further}")
 
 
 def _address(text: str) -> str:
@@ -108,7 +108,7 @@ _HEIGHTS = f"{HEIGHTS[0]:g} to {HEIGHTS[1]:g} (mm)"
 _SHARED: Mapping[str, dict[str, Any]] = {
     "quantity": {
         "choices": NAMES, "default": SED.name, "metavar": "NAME",
-        "help": f"of the ending, {{}} in place of the SED: {', '.join(NAMES)}",
+        "help": f"quantity at the ending {{}} in place of the SED: {', '.join(NAMES)}",
     },
     "kinematics": {"choices": _STRAINS, "default": "small"},
     "tau": {"choices": ["computed", "as-printed"], "default": "computed"},
@@ -116,14 +116,14 @@ _SHARED: Mapping[str, dict[str, Any]] = {
     "variants": {"choices": ["none", "small", "both"]},
     "height": {"type": number_in_range("--height", float, *HEIGHTS, _HEIGHTS), "metavar": "MM"},
     "simulate_subject": {"type": number_in_range("--simulate-subject", int, 0, LARGEST), "metavar": "SEED"},
-    "headless": {"action": "store_true", "help": "changes nothing: this verb never opens a window"},
+    "headless": {"action": "store_true", "help": "no effect: this verb never opens a window"},
     "workers": {
         "type": number_in_range("--workers", int, 1, 1024), "metavar": "N",
         "help": "processes on this computer (as many as cores)",
     },
     "scheduler": {
         "type": _address, "metavar": "ADDRESS",
-        "help": "of a Dask cluster you trust, such as tls://host:8786, in place of this computer",
+        "help": "address of a Dask cluster you trust, such as tls://host:8786, in place of this computer",
     },
 }  # fmt: skip
 _BEFORE = {"variants": ["--beside"]}  # former names of options
@@ -143,9 +143,9 @@ _FINGER = ("tip_radius", "width", "contact_angle")
 
 def add_body_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare --finger and --depth, the subject's own finger and depths."""
-    meaning = "as measured on the subject: tip_radius [mm], width of the contact [mm], contact_angle [degrees]"
+    meaning = "measured on the subject: tip_radius [mm], width of the contact [mm], contact_angle [degrees]"
     parser.add_argument("--finger", nargs="+", default=[], metavar="NAME=VALUE", help=meaning)
-    meaning = "the subject's own, in place of a block's"
+    meaning = "the subject's own indentation, in place of the block's"
     parser.add_argument("--depth", nargs="+", default=[], metavar="BLOCK=MM", help=meaning)
 
 
@@ -173,21 +173,21 @@ def measures_sentence(plan: SessionPlan) -> str | None:
     return f"{plan.subject}'s own: {', '.join(facts)}" if facts else None
 
 
-AS_BEFORE = "as the session was analysed before, or else fixed"
+AS_BEFORE = "as in the session's last analysis, or fixed"
 
 
 def add_analysis(parser: argparse.ArgumentParser, otherwise: str = AS_BEFORE) -> None:
     """Declare --area, --area-force and --calibration-error; `otherwise` names the default area."""
-    meaning = "contact area for tau_max: fixed (the plan's), hertz (grows as N^(2/3)), or an exponent of N; where none"
-    parser.add_argument("--area", metavar="LAW", help=f"{meaning} is given {otherwise}")
-    meaning = f"normal force at which an area that grows is the plan's ({PLANNED_AT:g}, assumed)"
+    meaning = "contact area for tau_max: fixed (the plan's), hertz (grows as N^(2/3)), or an exponent of N"
+    parser.add_argument("--area", metavar="LAW", help=f"{meaning} ({otherwise})")
+    meaning = f"normal force at which a growing area equals the plan's ({PLANNED_AT:g}, assumed)"
     add_number(parser, "--area-force", float, (0.01, 100.0), meaning, None, "NEWTON", "0.01 to 100 (N)")
     add_calibration(parser)
 
 
 def add_calibration(parser: argparse.ArgumentParser) -> None:
     """Declare --calibration-error, the standard uncertainty of each axis's gain [-], typed in per cent."""
-    meaning = "standard uncertainty of each axis of the transducer (else as set before for the session, or 1, assumed)"
+    meaning = "standard uncertainty of each axis of the transducer (as last set for the session, or 1, assumed)"
     parse = number_in_range("--calibration-error", float, 0.0, 20.0, "0 to 20 (per cent)", per=100)
     parser.add_argument("--calibration-error", type=parse, metavar="PERCENT", help=meaning)
 
@@ -198,7 +198,7 @@ def area_law(options: argparse.Namespace) -> AreaLaw | None:
         return None
     if options.area in ("fixed", None):
         if options.area_force is not None:
-            raise WrongValue("--area-force says nothing of a fixed area: give --area hertz or an exponent too")
+            raise WrongValue("--area-force has no effect on a fixed area: give --area hertz or an exponent too")
         return FIXED
     force = PLANNED_AT if options.area_force is None else options.area_force
     if options.area == "hertz":

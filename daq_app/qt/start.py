@@ -84,9 +84,9 @@ def command_line() -> Parser:
     """Return the parser of `daq-app window`."""
     parser = Parser("daq-app window", description="Open the window.", epilog="Example: daq-app window recordings/P07")
     parser.add_argument("session", nargs="?", type=Path, metavar="SESSION", help="a session to review (a new one)")
-    meaning = "where the subject's page is: a window here, or a tablet's browser on the lab's network (window)"
+    meaning = "show the subject's page in a window here, or in a tablet's browser on the lab's network (window)"
     parser.add_argument("--subject-screen", choices=("window", "web"), default="window", help=meaning)
-    meaning = "this machine's address for the tablet (that of its own network)"
+    meaning = "this computer's address for the tablet (its address in its own network)"
     parser.add_argument("--subject-address", metavar="IP", help=meaning)
     return parser
 

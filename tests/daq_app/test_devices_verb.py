@@ -41,7 +41,7 @@ def test_who_answers_is_listed_with_what_it_has_been_through(monkeypatch, capsys
     assert [INFO.uri, INFO.model, "FT1234", "typed in"] in rows
     assert ["labjack-u6:", "–", "–", "no answer"] in rows
     assert "labjack-u6: nothing answers" in text.splitlines()
-    assert "/dev/ttyUSB0 is a serial port, which was not opened: ask it as " in text
+    assert "/dev/ttyUSB0 is a serial port, which was not opened: try it as " in text
     assert "FT1234: zero moved by at most 0.30 N since " in text
     assert "(2 zeros), noise at rest 0.0040 N, no overload" in text
     remember_overload(INFO, (1.2,) * 7)

@@ -241,7 +241,7 @@ def test_a_decision_is_recorded_listed_followed_by_every_verb_and_undone(small, 
     assert moved["decision"]["old"] == [start, stop]
     assert re.search(r"speed \S+ -> \S+ mm/s", moved["changes"][0])
     assert run([*decide, "--trial", "2", "--drop"]) == 0
-    assert answer(capsys)["changes"] == ["stroke 1 of trial 2: the model does not get it"]
+    assert answer(capsys)["changes"] == ["stroke 1 of trial 2: no longer used by the model"]
     run(["analyse", str(small), "--json"])
     after = answer(capsys)
     assert after["strokes"][0]["steady"] == pytest.approx([start + 0.2, stop - 0.3], abs=0.006)

@@ -179,7 +179,7 @@ def test_a_row_is_given_back_by_the_command_line(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "code", "excerpt"),
     [
-        (["run", "--scores-only", "--subject", "P01"], 2, "give a PROTOCOL, or --study"),
+        (["run", "--scores-only", "--subject", "P01"], 2, "give either a PROTOCOL, or --study"),
         (
             ["run", "paired-comparison", "--scores-only", "--subject", "P01", "--finger", "length=3"],
             2,

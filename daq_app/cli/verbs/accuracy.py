@@ -21,10 +21,10 @@ EXAMPLE = "daq-app accuracy --quick --out accuracy"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--quick", action="store_true", help="half a minute instead of three, and coarser truths")
-    parser.add_argument("--out", type=Path, default=Path("accuracy"), metavar="DIR", help="the folder (accuracy)")
-    parser.add_argument("--docs", type=Path, metavar="DIR", help="also write the tables into the pages of these docs")
-    meaning = "page and tables of an earlier run; nothing is measured"
+    parser.add_argument("--quick", action="store_true", help="half a minute instead of three, with coarser references")
+    parser.add_argument("--out", type=Path, default=Path("accuracy"), metavar="DIR", help="folder to write (accuracy)")
+    parser.add_argument("--docs", type=Path, metavar="DIR", help="also write the tables into these docs")
+    meaning = "make page and tables from an earlier run; nothing is measured"
     parser.add_argument("--data", type=Path, metavar="accuracy.json", help=meaning)
 
 
@@ -36,8 +36,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     _docs(options, {})
     results = _measure_or_restore(options, console)
     if results.stopped:
-        remark = "; the docs stay as they are" if options.docs else ""
-        console.note(f"stopped; drawing what was measured until then{remark}")
+        remark = "; the docs are not changed" if options.docs else ""
+        console.note(f"stopped; drawing the measurements made so far{remark}")
     console.progress(0.99, "drawing")
     write(results, options.out)
     console.result({"page": str(options.out / PAGE), **results.to_dict()})

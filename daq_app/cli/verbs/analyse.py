@@ -20,7 +20,7 @@ EXAMPLE = "daq-app analyse recordings/P07 --json"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_session(parser)
-    add_number(parser, "--bootstrap-seed", int, (0, math.inf), "of the intervals (as before, or 0)", metavar="SEED")
+    add_number(parser, "--bootstrap-seed", int, (0, math.inf), "seed of the intervals (last one, or 0)", metavar="SEED")
     add_analysis(parser)
 
 

@@ -28,7 +28,7 @@ CHANGING = ("mu_static", "mu_dynamic", "mu_max", "tau_max", "speed", "direction"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_session(parser)
-    parser.add_argument("--trial", type=int, metavar="N", help="whose stroke; leave out for a recording without trials")
+    parser.add_argument("--trial", type=int, metavar="N", help="the stroke's trial; none if there are no trials")
     parser.add_argument("--stroke", type=int, metavar="K", default=1, help="its number within the trial (1)")
     choices = parser.add_mutually_exclusive_group(required=True)
     window = partial(choices.add_argument, type=float, nargs=2, metavar=("FROM", "TO"))
@@ -39,15 +39,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     choices.add_argument("--slide-onset", type=float, metavar="S", help="where the slide begins, for mu_static [s]")
     choices.add_argument("--direction", type=int, choices=[1, -1], help="1 proximal to distal, -1 distal to proximal")
     for name, meaning in (
-        ("--drop", "the stroke stays out: it is shown, the model does not get it"),
-        ("--keep", "the stroke stays in, its flaws were looked at"),
-        ("--choose", "of its trial's strokes the model gets this one"),
-        ("--list", "only tell what was decided"),
+        ("--drop", "exclude the stroke: it is shown, but not used by the model"),
+        ("--keep", "include the stroke: its flaws were examined"),
+        ("--choose", "use this stroke of its trial in the model"),
+        ("--list", "only list the decisions"),
     ):
         choices.add_argument(name, action="store_true", help=meaning)
-    meaning = "of the session: level a face that leans so far to +x and to +y; without numbers as its presses tell"
+    meaning = "tilt of the session's face to +x and to +y, to level it; without numbers, as estimated from its presses"
     choices.add_argument("--tilt", type=float, nargs="*", metavar="DEGREES", help=meaning)
-    choices.add_argument("--undo", type=int, metavar="NUMBER", help="take a decision back")
+    choices.add_argument("--undo", type=int, metavar="NUMBER", help="withdraw a decision")
     parser.add_argument("--by", metavar="CODE", help="who decides: a code, never a name")
     parser.add_argument("--why", metavar="REASON", help="in a few words")
 
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         raise WrongValue("a decision says who decides and why: give --by CODE and --why REASON")
     check_code("--by", options.by)
     if options.choose and options.trial is None:
-        raise WrongValue("--choose is of a trial, whose stroke --stroke names: give --trial N")
+        raise WrongValue("--choose picks a stroke of a trial: give --trial N")
     document = stored_document(recording.folder, ANALYSIS)
     gain_error_set(recording.folder)  # raises if damaged, before a decision is recorded that could not be analysed
     analysis = analyse(recording, settings_of(document or {}), decisions)
@@ -102,7 +102,7 @@ def _tilt(options: argparse.Namespace, analysis: Analysis) -> Decision:
     if angles:
         return Decision(options.by, options.why, "tilt", new=(angles[0], angles[1]))
     if analysis.tilt is None:
-        raise DecisionError("nothing pressed without sliding, so the tilt is not known: give two angles after --tilt")
+        raise DecisionError("no press without a slide, so the tilt is not known: give two angles after --tilt")
     return Decision(options.by, options.why, "tilt", new=analysis.tilt.lean)
 
 
@@ -126,7 +126,7 @@ def _changes(old_analysis: Analysis, new_analysis: Analysis) -> list[str]:
         numbers = ((name, *(number(getattr(s, name), 4) for s in (old_stroke, new_stroke))) for name in CHANGING)
         texts = [f"{name} {old} -> {new} {units[name].unit}".rstrip() for name, old, new in numbers if old != new]
         if (index in of_model) != (index in new_of_model):
-            texts.append("the model gets it" if index in new_of_model else "the model does not get it")
+            texts.append("now used by the model" if index in new_of_model else "no longer used by the model")
         if texts:
             trial = "" if new_stroke.trial is None else f" of trial {new_stroke.trial}"
             sentences.append(f"stroke {new_stroke.number}{trial}: {', '.join(texts)}")

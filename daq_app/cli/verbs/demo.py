@@ -1,7 +1,8 @@
 """Run the paper's study end to end on the simulated transducer and simulated subjects.
 
-Ten subjects score ten surfaces; one of them repeats the strokes on a simulated force/torque box, whose records travel
-over UDP on this computer to the driver a real box is read by. Everything is recorded, analysed, predicted and reported.
+Ten subjects score ten surfaces. One of them repeats the strokes on a simulated force/torque box, which sends its
+records over UDP on this computer to the driver of the real box. Everything is recorded, analysed, predicted and
+reported.
 """
 
 import argparse
@@ -28,8 +29,8 @@ _PACE = 20.0  # simulated seconds per real second
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, metavar="DIR", help="a new folder (demo-results/TIME)")
-    add_seed(parser, "of surfaces' noise, subjects and orders (1)", 1)
-    add_flag(parser, "--real-time", f"keep the clock; otherwise time runs {_PACE:g} times faster")
+    add_seed(parser, "seed of the surfaces' noise, the subjects and the orders (1)", 1)
+    add_flag(parser, "--real-time", f"run in real time; otherwise time runs {_PACE:g} times as fast")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

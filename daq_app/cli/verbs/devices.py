@@ -1,7 +1,7 @@
 """List the transducers that can be reached now, or open one and print its health and noise for 3 s.
 
-Listing only asks who is there, at the devices' usual addresses and at those named; a device in use is not disturbed.
-Serial ports are named without being opened.
+Listing only queries the devices' usual addresses and those given; a device in use is not disturbed. Serial ports are
+listed without being opened.
 """
 
 import argparse
@@ -28,7 +28,7 @@ PROBED = 3.0  # how long a probe listens [s]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    meaning = "further addresses to ask; or 'probe URI' to open that one and listen"
+    meaning = "further addresses to query; or 'probe URI' to open that one and listen"
     parser.add_argument("words", nargs="*", metavar="URI", help=meaning)
 
 
@@ -47,11 +47,11 @@ def run(options: argparse.Namespace, console: Console) -> int:
         else [device.uri, "–", "–", "no answer"]
         for device in devices
     ]
-    rows.append(["sim:", "simulated bench", "–", "always there"])
+    rows.append(["sim:", "simulated bench", "–", "always available"])
     console.say(table(rows, header=["address", "model", "serial", "calibration"]))
     for line in lines:
         addresses = " or ".join(f"{driver.name}://{line}" for driver in DRIVERS if driver.serial_line)
-        console.say(f"{line} is a serial port, which was not opened: ask it as {addresses}")
+        console.say(f"{line} is a serial port, which was not opened: try it as {addresses}")
     for device in devices:
         if device.problem:
             problem = device.problem.removeprefix(f"{device.uri}: ")
@@ -75,7 +75,7 @@ def _description(device: Probe) -> dict[str, Any]:
 def _life_text(life: Life) -> str:
     overloads = f"{life.overloads} overloads, the last on {life.last_overload}" if life.overloads else "no overload"
     if not life.zeros:
-        return f"{overloads} since it is known here"
+        return f"{overloads} since its first use here"
     drift, noise = max(map(abs, life.drift[:3])), max(life.noise[:3])
     return (
         f"zero moved by at most {number(drift, 2)} N since {life.since} ({life.zeros} zeros), "
@@ -110,7 +110,7 @@ def _probe(uri: str, console: Console) -> int:
     counts = ", ".join(f"{label} {getattr(health, name)}" for name, label in COUNT_LABELS.items())
     console.say(f"{counts}, lag {health.lag_ms:.1f} ms")
     if health.flagged:
-        console.say(f"the status of readings said: {flagged_words(health.flagged)}")
+        console.say(f"status of the readings: {flagged_words(health.flagged)}")
     if health.rate_words:
         console.say(health.rate_words)
     if mean is not None and noise is not None:

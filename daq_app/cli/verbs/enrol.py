@@ -1,6 +1,6 @@
-"""Enrol a subject in a study: a row of its design is reserved, and given back when the subject is withdrawn.
+"""Enrol a subject in a study: a row of its design is reserved, and released when the subject is withdrawn.
 
-A study is a folder. --protocol makes it, and fixes its protocol; --blind hides which stimulus bears which code until
+A study is a folder. --protocol makes it, and fixes its protocol; --blind hides which stimulus has which code until
 'daq-app unblind' opens the key. Without --subject the study is printed.
 """
 
@@ -25,12 +25,12 @@ _COLUMNS = ["subject", "row", "own finger, angle, depths", "withdrawn"]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("study", type=Path, metavar="STUDY", help="the study's folder")
     parser.add_argument("--protocol", metavar="PROTOCOL", help="make the study: a built-in protocol, or a TOML file")
-    add_seed(parser, "of a new study's orders (one by chance, recorded, unless given)", None, 2**31 - 1)
-    parser.add_argument("--blind", action="store_true", help="of a new study: codes alone until it is unblinded")
+    add_seed(parser, "seed of a new study's orders (a random one, which is recorded)", None, 2**31 - 1)
+    parser.add_argument("--blind", action="store_true", help="for a new study: show codes only until it is unblinded")
     parser.add_argument("--subject", metavar="CODE", help="a code, never a name")
     add_body_arguments(parser)
-    parser.add_argument("--withdraw", metavar="REASON", help="take the subject out; its row is given back")
-    meaning = "write the code of each stimulus, for whoever puts the labels on"
+    parser.add_argument("--withdraw", metavar="REASON", help="withdraw the subject; its row is released")
+    meaning = "write the code of each stimulus, for the person who labels them"
     parser.add_argument("--labels", type=Path, metavar="FILE", help=meaning)
 
 
@@ -51,7 +51,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         member = studies.enrol(folder, options.subject, body)
     if options.labels is not None:
         _write_labels(folder, options.labels)
-        console.note(f"{options.labels} says which stimulus bears which code: it is for whoever puts the labels on")
+        console.note(f"{options.labels} says which stimulus has which code: give it to the person who labels them")
     _show(studies.open_study(folder), member, console)
     return DONE
 
@@ -65,7 +65,7 @@ def _refuse_mixtures(options: argparse.Namespace) -> None:
     if options.withdraw is not None and options.subject is None:
         raise WrongValue("--withdraw needs --subject")
     if (options.finger or options.depth) and (options.subject is None or options.withdraw is not None):
-        raise WrongValue("--finger and --depth are of a subject that is being enrolled: give --subject")
+        raise WrongValue("--finger and --depth describe a subject that is being enrolled: give --subject")
 
 
 def _write_labels(folder: Path, path: Path) -> None:
@@ -90,7 +90,7 @@ def _show(study: Study, member: Member | None, console: Console) -> None:
             "subjects": rows,
         }
     )
-    design = "every order by chance" if study.rows is None else f"a Williams design of {study.rows} rows"
+    design = "random orders" if study.rows is None else f"a Williams design of {study.rows} rows"
     blind = "" if study.key_sha256 is None else ", unblinded" if study.unblinded else ", blinded"
     console.say(f"{study.name}: {study.protocol.name}, {design}{blind}")
     cells = [[row["subject"], str(row["row"]), row["own"] or "–", row["withdrawn"] or "–"] for row in rows]

@@ -22,7 +22,7 @@ EXAMPLE = "daq-app export recordings/P07 --format csv --out P07-csv"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_session(parser)
-    parser.add_argument("--format", required=True, choices=sorted(FORMATS), help="what is written")
+    parser.add_argument("--format", required=True, choices=sorted(FORMATS), help="format of the export")
     parser.add_argument("--out", type=Path, metavar="DIR", help="a new folder (exports/SESSION-FORMAT)")
 
 
@@ -50,7 +50,7 @@ def _source(recording: Recording, console: Console) -> ExportSource:
         settings = analysis or {"gain_error": gain_error_set(recording.folder)}
         analysis = made_by | derived.repeat(ANALYSIS, settings, recording, decisions)
     if prediction is not None and not derived.is_current(prediction, decisions):
-        console.note(f"{PREDICTION} was made under other decisions than those in force, and is made anew")
+        console.note(f"{PREDICTION} was made under other decisions than those in force, and is computed again")
         prediction = made_by | derived.repeat(PREDICTION, prediction, recording, decisions)
     console.note(derived.outdated_prediction(recording, derived.settings_of(analysis)))
     return ExportSource(recording, analysis, prediction)

@@ -1,9 +1,9 @@
 """Fit the stiffness of each layer of a subject's own finger to presses whose displacement a stage logged.
 
 The session holds presses without a slide; the log holds the displacement of the bone or the stage, positive into the
-finger. Its header has displacement_mm and one of time_s, received_ns or sequence, as readings.csv of an export calls
-them, and may have contact_width_mm. Nothing in the session is changed. The scene written by --scene is taken by
-'predict --scene' and 'solve'.
+finger. Its header has displacement_mm and one of time_s, received_ns or sequence (as in readings.csv of an export), and
+may have contact_width_mm. Nothing in the session is changed. 'predict --scene' and 'solve' accept the scene written by
+--scene.
 """
 
 import argparse
@@ -44,14 +44,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--displacement", type=Path, required=True, metavar="FILE.csv", help="log of the stage")
     meaning = "scene file with the finger's dimensions (else the session's own)"
     parser.add_argument("--finger", type=Path, metavar="FILE", help=meaning)
-    add_number(parser, "--shift", float, (-1e9, 1e9), "added to the log's times (0)", 0.0, "S")
+    add_number(parser, "--shift", float, (-1e9, 1e9), "time to add to the log's times (0)", 0.0, "S")
     meaning = f"friction of the surface pressed ({_MU:g}, assumed; from 0.3 on the force hardly changes)"
     add_number(parser, "--mu", float, (0.0, 5.0), meaning, _MU, "MU")
     meaning = f"one standard deviation of each stiffness about the published one, as a factor ({FACTOR:g}, assumed)"
     add_number(parser, "--prior", float, (1.1, 4.0), meaning, FACTOR, "FACTOR")
     add_flag(parser, "--relaxation", "also fit how the finger relaxes while the stage holds; --scene includes it")
-    add_seed(parser, "of the posterior's draws (0)", largest=2**32)
-    parser.add_argument("--scene", type=Path, metavar="OUT.toml", help="write the finger found as a scene file")
+    add_seed(parser, "seed of the posterior's draws (0)", largest=2**32)
+    parser.add_argument("--scene", type=Path, metavar="OUT.toml", help="write the fitted finger as a scene file")
     add_calibration(parser)
 
 
@@ -111,7 +111,7 @@ def _curves(options: argparse.Namespace, recording: Recording, settings: Analysi
     """Return the presses that the log covers. Raises FitError if there are none, and ImportRefused."""
     log = displacement_log(options.displacement)
     if options.shift and log.clock == "sequence":
-        raise WrongValue("--shift is of times, and the log counts readings: leave it out")
+        raise WrongValue("--shift applies to times, and the log counts readings: leave it out")
     shift = options.shift * (1e9 if log.clock == "received_ns" else 1.0)
     curves = press_curves(recording, replace(log, instants=log.instants + shift), settings)
     if not curves.presses:
@@ -168,7 +168,7 @@ def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> 
         ]
         for layer, share in zip(finger_fit.layers, solver_check.shares, strict=True)
     ]
-    console.say(table(rows, header=["E [kPa]", "found", "95 % interval", "by likelihood alone", "prior", "share of N"]))
+    console.say(table(rows, header=["E [kPa]", "fit", "95 % interval", "by likelihood alone", "prior", "share of N"]))
     overall, (low, high) = finger_fit.overall, (finger_fit.overall.low or 0.0, finger_fit.overall.high or 0.0)
     console.say(
         f"overall stiffness: {number(overall.value)} of the published finger's, 95 % interval {span(low, high)}, from "
@@ -180,7 +180,7 @@ def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> 
         share, time = outcome.relaxation.part, outcome.relaxation.time
         console.say(
             f"relaxation: part {share.value:.2f} (95 % {_interval_text(share, 1.0)}), time {number(time.value)} s "
-            f"(95 % {_interval_text(time, 1.0)}); the stiffness above is that at once"
+            f"(95 % {_interval_text(time, 1.0)}); the stiffness above is the instantaneous one"
         )
         console.say(outcome.relaxation.sentence)
     console.say(

@@ -1,9 +1,8 @@
-"""Make a session folder of a foreign recording, or of an export of this program; every other verb accepts it.
+"""Make a session folder from a foreign recording or from an export of this program; every other verb accepts it.
 
-An export (a folder of csv or bids, or a file session.h5) comes back whole, compared reading by reading; nothing needs
-to be stated. Of a foreign CSV file, a header that names units and a time column (t_s, Fx_N ... Tz_Nm) needs no options:
-N = -Fz and height 0 are taken as defaults and marked so. Otherwise say what the columns are, in which units, and at
-which rate they were taken.
+An export (a csv or bids folder, or a file session.h5) is restored completely and compared reading by reading; it needs
+no options. A foreign CSV file needs none either if its header names units and a time column (t_s, Fx_N ... Tz_Nm):
+N = -Fz and height 0 are then assumed, and marked as defaults. Otherwise give the columns, their units and their rate.
 """
 
 import argparse
@@ -27,12 +26,12 @@ _OF_FOREIGN = ("units", "axes", "normal", "height", "rate", "zeroed", "subject")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="FILE.csv, or what 'daq-app export' wrote")
-    parser.add_argument("--units", metavar="N,Nmm", help="of forces and torques: N,Nmm or N,Nm")
-    parser.add_argument("--axes", metavar="t,Fx,...", help="what the columns are, from the first on; - leaves one out")
+    parser.add_argument("--units", metavar="N,Nmm", help="units of forces and torques: N,Nmm or N,Nm")
+    parser.add_argument("--axes", metavar="t,Fx,...", help="quantities in the columns, from the first on; - skips one")
     parser.add_argument("--normal", metavar="AXIS", help="axis along which pressing is positive, e.g. -z")
-    add_shared(parser, height="of the stimulus's face above the origin")
-    parser.add_argument("--rate", type=float, metavar="HZ", help="readings a second, where the file has no times")
-    parser.add_argument("--zeroed", action="store_true", help="the file's zeros are those of the unloaded transducer")
+    add_shared(parser, height="height of the stimulus's face above the origin")
+    parser.add_argument("--rate", type=float, metavar="HZ", help="readings per second, if the file has no times")
+    parser.add_argument("--zeroed", action="store_true", help="the file's zero is that of the unloaded transducer")
     parser.add_argument("--subject", metavar="CODE", help="a code, never a name (unknown)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="the session's folder (recordings/FILE)")
 
@@ -65,7 +64,7 @@ def _restore_export(session: "ExportedSession", options: argparse.Namespace, con
 
     names = [name for name in _OF_FOREIGN if getattr(options, name) not in (None, False)]
     if names:
-        raise WrongValue(f"--{names[0]} says nothing of an export, which holds all that is known: leave it out")
+        raise WrongValue(f"--{names[0]} does not apply to an export, which already says it: leave it out")
     folder = options.out or Path("recordings") / options.file.stem
     with _whole_session(folder):
         summary = import_session(session, folder)
@@ -101,9 +100,9 @@ def _import_foreign(options: argparse.Namespace, console: Console) -> int:
     document = asdict(summary)
     console.result({"session": str(document.pop("folder")), **document})
     console.say(
-        f"{summary.folder}: {summary.readings} readings at {number(summary.rate, 4)} a second",
+        f"{summary.folder}: {summary.readings} readings at {number(summary.rate, 4)} per second",
         *(f"default: {default}" for default in summary.defaults),
-        f"kept in the original file alone: {', '.join(summary.extra)}" if summary.extra else None,
+        f"kept only in the original file: {', '.join(summary.extra)}" if summary.extra else None,
     )
     return DONE
 

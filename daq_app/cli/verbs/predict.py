@@ -31,24 +31,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_shared(
         parser,
         kinematics="small strain (the paper's), or finite strain, where some sticky surfaces have no settled sliding",
-        tau="reading of the traction bound: force over area, or a hundredth of it, as the paper's tables are headed",
+        tau="how to read the traction bound: force over area, or a hundredth of it, as the paper's tables are headed",
         quantity="to print (--json has all)",
         variants="also with tau_max as printed, at the measured force, and slid the other way: at small strain (about "
-        "a second), or at finite strain too (about a minute: limits are looked for where a surface has no settled "
-        "slide); small, or all that was predicted before",
+        "a second), or at finite strain too (about a minute: limits are computed where a surface has no settled "
+        "slide); by default small, or as predicted before",
     )
-    meaning = "scene file with another finger; friction and loading are the trials'"
+    meaning = "scene file with another finger; friction and loading stay those of the trials"
     parser.add_argument("--scene", type=Path, metavar="FILE", help=meaning)
     span = (math.ulp(0.0), DEEPEST_INDENTATION)
-    add_number(parser, "--indentation", float, span, "instead of each block's own", None, "MM", INDENTATIONS)
-    meaning = "also what the uncertainty of friction makes of each SED (more solves; as before where nothing is given)"
+    add_number(parser, "--indentation", float, span, "in place of each block's own", None, "MM", INDENTATIONS)
+    meaning = "also the interval of each SED from the uncertainty of friction (more solves; as predicted before)"
     parser.add_argument("--intervals", action=argparse.BooleanOptionalAction, help=meaning)
-    meaning = "also firing rates and spike times of an SA-II afferent that answers to that quantity: an illustration"
+    meaning = "also firing rates and spike times of an SA-II afferent responding to --quantity: an illustration"
     add_flag(parser, "--afferent", meaning)
     meaning = "a parameter of the afferent, such as static_gain=30; --afferent prints all of them"
     parser.add_argument("--afferent-set", action="append", default=[], metavar="NAME=VALUE", help=meaning)
-    add_number(parser, "--afferent-seed", int, (0, math.inf), "of the spike times (0)", 0, "SEED")
-    add_flag(parser, "--seal", "hash and keep the prediction, so that it is shown to be older than unblinding")
+    add_number(parser, "--afferent-seed", int, (0, math.inf), "seed of the spike times (0)", 0, "SEED")
+    add_flag(parser, "--seal", "hash and keep the prediction, to prove that it is older than unblinding")
     add_analysis(parser)
 
 

@@ -26,10 +26,10 @@ EXAMPLE = "daq-app replay recordings/P07 --fast"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_session(parser)
     pace = parser.add_mutually_exclusive_group()
-    parse = number_in_range("--speed", float, 0.01, 10_000, "0.01 to 10000, or --fast for as fast as it goes")
-    pace.add_argument("--speed", type=parse, default=1.0, metavar="X", help="times as fast as it was recorded (1)")
-    pace.add_argument("--fast", action="store_true", help="as fast as the machine goes")
-    parser.add_argument("--no-prediction", action="store_true", help="leave the solver's numbers out")
+    parse = number_in_range("--speed", float, 0.01, 10_000, "0.01 to 10000, or --fast for as fast as possible")
+    pace.add_argument("--speed", type=parse, default=1.0, metavar="X", help="speed relative to the recording (1)")
+    pace.add_argument("--fast", action="store_true", help="as fast as this computer can")
+    parser.add_argument("--no-prediction", action="store_true", help="do not compare the prediction")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -72,7 +72,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         *notes,
         *differences,
         f"{options.session}: {outcome} ({', '.join(items)} compared)",
-        f"{duration_s:.1f} s of session in {wall_s:.2f} s, the comparison not counted",
+        f"{duration_s:.1f} s of session in {wall_s:.2f} s, without the comparison",
     )
     return FLAWED if differences else DONE
 
@@ -80,7 +80,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 def _notes(recording: Recording) -> Iterator[str]:
     """Yield a note on each aspect that a replay of this recording cannot check."""
     if not recording.plan.forces:
-        yield "a visit that only scored: there are no readings, and its course follows what people did"
+        yield "a visit with scores only: there are no readings, and its course follows what people did"
     elif not recording.plan.trials:
-        yield "an imported recording: it had no course, so only its readings and what is made of them were gone through"
+        yield "an imported recording: it has no course, so only its readings and the results from them were replayed"
     yield from recording.losses

@@ -25,18 +25,18 @@ EXAMPLE = "daq-app report recordings/P07 -o P07.html --scores recordings/P01 rec
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_visit(parser, "; all its scores join in")
+    add_visit(parser, "; all scores of the study are included")
     parser.add_argument("-o", "--out", type=Path, metavar="FILE.html", help="the page (SESSION/report.html)")
     parser.add_argument("--scores", type=Path, nargs="+", default=[], metavar="SESSION", help="further visits")
     add_shared(
         parser,
-        paths="also along every other reasonable choice of the analysis; with 'finite' at finite strain too (a minute)",
-        variants="also otherwise, as for 'daq-app predict': both readings of tau_max, by depth and by force, both "
-        "ways; with 'both' at finite strain too (about a minute); small, or all that was predicted before",
-        quantity="to hold against scores and rivals",
+        paths="also with every other reasonable choice of the analysis; with 'finite' at finite strain too (a minute)",
+        variants="also variants, as for 'daq-app predict': both readings of tau_max, by depth and by force, in both "
+        "directions; with 'both' at finite strain too (about a minute); by default small, or as predicted before",
+        quantity="to compare with scores and rivals",
     )
-    meaning = "also firing rates of an SA-II afferent that answers to --quantity: an illustration (or where it was kept"
-    add_flag(parser, "--afferent", f"{meaning} before)")
+    meaning = "also firing rates of an SA-II afferent that responds to --quantity: an illustration (also if"
+    add_flag(parser, "--afferent", f"{meaning} stored before)")
     parser.add_argument("--figures", type=Path, metavar="DIR", help="also write every picture as SVG, its data as CSV")
     add_analysis(parser)
 

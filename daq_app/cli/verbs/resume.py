@@ -21,10 +21,10 @@ EXAMPLE = "daq-app resume recordings/P07 --device net-ft://192.168.1.1"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_session(parser)
-    parser.add_argument("--device", metavar="URI", help="the transducer (where it was when the session began)")
-    add_shared(parser, "headless", simulate_subject="simulated people (those of the beginning)")
-    parser.add_argument("--pace", type=float, help="simulated seconds a real second (as at the beginning)")
-    add_flag(parser, "--end", "seal the session as it is, and do not go on")
+    parser.add_argument("--device", metavar="URI", help="the transducer (its address when the session began)")
+    add_shared(parser, "headless", simulate_subject="seed of simulated people (as at the beginning)")
+    parser.add_argument("--pace", type=float, help="simulated seconds per real second (as at the beginning)")
+    add_flag(parser, "--end", "seal the session as it is, without resuming it")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

@@ -1,4 +1,4 @@
-"""Run one session: the plan is made from a protocol and a seed, everything is recorded as it happens, then sealed.
+"""Run one session: plan it from a protocol and a seed, record everything as it happens, then seal the recording.
 
 Experimenter and subject answer at this terminal, or are simulated (on the simulated bench only).
 """
@@ -27,30 +27,30 @@ EXAMPLE = "daq-app run sensotact-friction --device sim:?seed=7 --subject P07 --h
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    meaning = "a built-in one such as sensotact-friction, or a TOML file"
+    meaning = "a built-in protocol such as sensotact-friction, or a TOML file"
     parser.add_argument("protocol", nargs="?", metavar="PROTOCOL", help=meaning)
-    parser.add_argument("--study", type=Path, metavar="STUDY", help="protocol, order and finger are the study's")
+    parser.add_argument("--study", type=Path, metavar="STUDY", help="take protocol, order and finger from this study")
     device = parser.add_mutually_exclusive_group(required=True)
     device.add_argument("--device", metavar="URI", help="the transducer, e.g. sim: or net-ft://192.168.1.1")
     device.add_argument("--scores-only", action="store_true", help="a visit without a transducer")
     parser.add_argument("--subject", required=True, metavar="CODE", help="a code, never a name")
-    parser.add_argument("--seed", type=int, help="of the stimulus order (a new one, recorded, unless given)")
-    phases, meaning = get_args(Phase), f"of the visit, of {', '.join(get_args(Phase))} (the protocol's own)"
+    parser.add_argument("--seed", type=int, help="seed of the stimulus order (a random one, which is recorded)")
+    phases, meaning = get_args(Phase), f"phases of the visit: {', '.join(get_args(Phase))} (the protocol's own)"
     parser.add_argument("--phases", nargs="+", choices=phases, metavar="PHASE", help=meaning)
     add_body_arguments(parser)
-    height = "of the stimulus's face above the sensor's origin"
-    add_shared(parser, "headless", simulate_subject="simulated people", height=height)
-    meaning = "simulated seconds a real second, simulated people only (1)"
+    height = "height of the stimulus's face above the sensor's origin"
+    add_shared(parser, "headless", simulate_subject="seed of simulated people", height=height)
+    meaning = "simulated seconds per real second, for simulated people only (1)"
     parser.add_argument("--pace", type=float, default=1.0, help=meaning)
-    parser.add_argument("--normal", choices=NORMALS, help="axis along which pressing is +")
+    parser.add_argument("--normal", choices=NORMALS, help="axis along which pressing is positive")
     allowed = f"{AREAS[0]:g} to {AREAS[1]:g} (mm2)"
-    add_number(parser, "--contact-area", float, AREAS, "of finger and surface, for tau_max", None, "MM2", allowed)
-    parser.add_argument("--stroking-hand", choices=["left", "right"], help="recorded; unknown unless stated")
-    parser.add_argument("--answering-hand", choices=["left", "right"], help="recorded; unknown unless stated")
-    meaning = "that the subject reads, such as de; the protocol must have it (its own)"
+    add_number(parser, "--contact-area", float, AREAS, "contact area, for tau_max", None, "MM2", allowed)
+    parser.add_argument("--stroking-hand", choices=["left", "right"], help="hand that strokes, recorded (unknown)")
+    parser.add_argument("--answering-hand", choices=["left", "right"], help="hand that answers, recorded (unknown)")
+    meaning = "language that the subject reads, such as de; the protocol must have it (its own)"
     parser.add_argument("--language", metavar="XX", help=meaning)
     parser.add_argument("--out", type=Path, metavar="DIR", help="the session's folder (one below recordings/)")
-    add_flag(parser, "--any-folder", "also on a network drive or in a synchronised folder: at your own risk")
+    add_flag(parser, "--any-folder", "allow a network drive or a synchronised folder, at your own risk")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -87,11 +87,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.result({"session": str(folder), "end": asdict(end), "sealed": outcome.sealed, "seed": seed})
     console.say(f"{folder}: {end.reason}; {end.readings} readings, {end.health.lost} lost")
     if end.health.flagged:
-        console.say(f"the status of readings said: {flagged_words(end.health.flagged)}")
+        console.say(f"status of the readings: {flagged_words(end.health.flagged)}")
     if end.cause in RESUMABLE:
-        console.note(
-            f"it is not sealed yet: 'daq-app resume {folder}' goes on at the same trial, with --end it is ended"
-        )
+        console.note(f"it is not sealed yet: 'daq-app resume {folder}' resumes it at the same trial, --end seals it")
     return outcome.exit_code
 
 
@@ -105,7 +103,7 @@ def _choices(options: argparse.Namespace) -> tuple[Protocol, int, Body, StudyPla
 
 def _refuse_mixtures(options: argparse.Namespace, *, simulated_bench: bool) -> None:
     if (options.protocol is None) == (options.study is None):
-        raise WrongValue("give a PROTOCOL, or --study, which has its own; one of the two")
+        raise WrongValue("give either a PROTOCOL, or --study, which has its own")
     if options.study is not None and (options.seed is not None or options.finger or options.depth):
         raise WrongValue("--seed, --finger and --depth are not allowed with --study: they were decided at enrolment")
     if options.simulate_subject is not None and not (simulated_bench or options.scores_only):

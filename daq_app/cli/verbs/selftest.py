@@ -47,7 +47,7 @@ AReport = TypeVar("AReport", bound=m.Report)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    meaning = "where sessions will be (recordings/)"
+    meaning = "folder for the sessions (recordings/)"
     parser.add_argument("--out", type=Path, metavar="DIR", default=Path("recordings"), help=meaning)
 
 

@@ -49,15 +49,15 @@ _OF_FINGERS = {"quantity": "sed", "kinematics": "small", "keep": None, "workers"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("scene", type=Path, nargs="?", metavar="SCENE.toml", help="without it: many fingers")
-    parser.add_argument("--design", type=Path, metavar="FILE", help="which numbers are varied, and how far")
+    parser.add_argument("scene", type=Path, nargs="?", metavar="SCENE.toml", help="leave out for many fingers")
+    parser.add_argument("--design", type=Path, metavar="FILE", help="which numbers to vary, and their ranges")
     fingers = f"{len(sign_map.DESIGN) + 2} N fingers ({OF_FINGERS})"
-    meaning = f"a power of two; N (numbers + 2) solves ({_SAMPLES}), or {fingers}"
+    meaning = f"N, a power of two: N (numbers + 2) solves ({_SAMPLES}), or {fingers}"
     parser.add_argument("--samples", type=int, metavar="N", help=meaning)
-    add_seed(parser, "of the samples (0)", largest=math.inf)
-    meaning = "answers of many fingers, written as they come: another run goes on"
+    add_seed(parser, "seed of the samples (0)", largest=math.inf)
+    meaning = "file of answers for many fingers, written as they come; a later run continues it"
     parser.add_argument("--keep", type=Path, metavar="FILE", help=meaning)
-    meaning = "strain of every finger but the one change that takes the other"
+    meaning = "strain of all fingers, except in the one change that uses the other"
     add_shared(parser, "workers", "scheduler", quantity="whose signs are shown", kinematics=meaning)
 
 
@@ -99,7 +99,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         f"design {origin}",
         _index_table(indices),
         "Shares of the variance of the SED, Sobol indices with half of their 95 % bootstrap intervals.",
-        f"Not varied, so nothing is said of them: {', '.join(constant)}." if constant else None,
+        f"Not varied, so without an index: {', '.join(constant)}." if constant else None,
         *doubtful,
     )
     return DONE
@@ -152,11 +152,11 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     if parameter := next((sobol[0].name for sobol, _ in indices.values() if sobol), None):
         _print_thirds(parameter, points, signs[:, column_index], label, console)
     for name, (sobol, count) in indices.items():
-        console.say(f"\nWhat moves the change of the {label} over {name} (Sobol indices, {count} fingers):")
+        console.say(f"\nWhat affects the change of the {label} over {name} (Sobol indices, {count} fingers):")
         if sobol:
             console.say(_index_table(sobol), *doubts(sobol, samples))
         else:
-            console.say("too few whole blocks of the design have an answer: ask for more --samples")
+            console.say("too few complete blocks of the design have an answer: use more --samples")
     return DONE
 
 
@@ -164,7 +164,7 @@ def _print_shares(
     shares: Mapping[str, tuple[float, float, float] | None], fingers: int, without_answer: int, console: Console
 ) -> None:
     console.say(
-        f"\n{fingers} fingers drawn at random from ranges that nobody measured (below), "
+        f"\n{fingers} fingers drawn at random from assumed ranges (below), "
         f"{without_answer} of them without a settled state on three surfaces of each series. "
         "Share of the others that keep both published signs:"
     )

@@ -25,11 +25,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", "--rdt-port", type=_port, dest="rdt_port", help="UDP port (49152)")
     parser.add_argument("--tcp-port", type=_port, help="TCP command port (49151)")
     parser.add_argument("--http-port", type=_port, help="HTTP port (80, or a free one)")
-    allowed = "the box gives 1 to 7000 readings a second"
-    add_number(parser, "--rate", int, (1, 7000), "readings a second of net-ft, 1 to 7000 (200)", allowed=allowed)
-    parser.add_argument("--baud", type=int, help="line speed of serial-ft in bits a second (38400)")
-    add_seed(parser, "of noise, drift and strokes (0)", largest=LARGEST_SEED)
-    add_number(parser, "--factor", float, (0.01, 1000.0), "how much faster than real time runs (1)", 1.0)
+    allowed = "the box gives 1 to 7000 readings per second"
+    add_number(parser, "--rate", int, (1, 7000), "readings per second of net-ft, 1 to 7000 (200)", allowed=allowed)
+    parser.add_argument("--baud", type=int, help="line speed of serial-ft in bits per second (38400)")
+    add_seed(parser, "seed of noise, drift and strokes (0)", largest=LARGEST_SEED)
+    add_number(parser, "--factor", float, (0.01, 1000.0), "speed relative to real time (1)", 1.0)
     parser.add_argument("--script", type=Path, help="TOML timetable of strokes and faults")
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from solver.response.receptor_row import Row
 
 EXAMPLE = "daq-app solve stickiness-100.toml --json"
-UNFINISHED = "Stopped before all that was asked for was done: this is what had been found by then."
+UNFINISHED = "Stopped early: these are the results so far."
 _UNITS = [("" if unit == "1" else unit, factor) for unit, factor in (response.shown_unit for response in QUANTITIES)]
 # Numbers of a load path besides the quantities, and the units of both.
 _COURSE = ("SED at the ending", "SED at the point", "normal force", "tangential force", "contact width")
@@ -41,7 +41,7 @@ AUDITS = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=Path, metavar="SCENE.toml", help="finger, materials, friction, loading, receptor")
-    meaning = "also every quantity along a row of endings so deep below the skin, as SA-I or RA endings lie"
+    meaning = "also every quantity along a row of endings at this depth below the skin, such as SA-I or RA endings"
     parser.add_argument("--row", type=float, metavar="MM", help=meaning)
 
 
@@ -112,7 +112,7 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
         ["estimating errors took", number(prediction.estimate_s, factor=1e3), "ms", ""],
     ]
     console.say(table(rows, header=["", "", "", "error, estimated"]))
-    console.say("\nEvery quantity at the ending, averaged over it (--json says what each is):")
+    console.say("\nEvery quantity at the ending, averaged over it (--json explains each):")
     responses = [
         [response.label, _with_error(*prediction.responses[response.name], factor), unit]
         for response, (unit, factor) in zip(QUANTITIES, _UNITS, strict=True)
@@ -130,10 +130,10 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
         console.say(table(lines, header=["arc [mm]", *(response.label for response in QUANTITIES)]).lstrip("\n"))
     effects = [[name, _percent(entry["estimate"])] for name, entry in prediction.model["left_out"].items()]
     console.say(
-        "\nLeft out of the model, and what of the SED that is estimated to have changed (--json says how it was found):"
+        "\nEffects left out of the model, and how much each is estimated to change the SED (--json explains how):"
     )
     console.say(table(effects, header=["", ""]).lstrip("\n"))
-    console.say("\nChecks of the state found (0 is perfect; a volume of 1 is one that did not change):")
+    console.say("\nChecks of the solution (0 is perfect; a volume of 1 is unchanged):")
     audits = [
         [label, number(prediction.audits[name] + 0.0, 2)] for name, label in AUDITS.items() if name in prediction.audits
     ]
@@ -179,7 +179,7 @@ def _print_course(numbers: "CourseNumbers", errors: "CourseNumbers", console: Co
         console.say(f"\n{title}")
         console.say(table(lines, header=["", "press", "break-away", "slide", ""]).lstrip("\n"))
     if not isfinite(errors.value[0, 0]):
-        console.say("Their errors are not known: the nested mesh has no such course, or its free cut folds.")
+        console.say("Their errors are unknown: the nested mesh has no such course, or its free cut folds.")
 
 
 def _plain(table: "Array") -> list[list[float | None]]:

@@ -1,9 +1,9 @@
-"""Pool many sessions: each analysed and predicted, group statistics, a page, and a table of all trials.
+"""Pool many sessions: analyse and predict each, and write group statistics, a page, and a table of all trials.
 
-Results are kept by the content they were made of, in OUT/results: what was computed once is not computed again, and
-Ctrl-C loses nothing that was done. A session that cannot be read is named and left out. Subjects are left out by
-decisions in FOLDER/exclusions.toml ([[exclude]] subject, why, who, and descriptor for one alone).
-With --power no session is needed: simulated studies say how many subjects and surfaces one needs.
+Results are stored in OUT/results by the content they depend on: nothing is computed twice, and Ctrl-C loses no finished
+result. A session that cannot be read is named and left out. FOLDER/exclusions.toml excludes subjects ([[exclude]]
+subject, why, who, and descriptor for one alone).
+With --power no session is needed: simulated studies show how many subjects and surfaces a study needs.
 With --synthetic a study of ten simulated subjects is made first, and its ground truth is compared with the estimates.
 """
 
@@ -50,14 +50,14 @@ RIVAL_SUBJECTS, RIVAL_SURFACES, RIVAL_STUDIES = (12, 24), (5, 8), 40
 def add_power(parser: argparse.ArgumentParser) -> None:
     """Declare --power and the options that belong to it."""
     defaults = ", ".join(f"{field.name}={field.default:g}" for field in fields(AssumedEffects))
-    meaning = f"how many subjects and surfaces a study needs, by simulation; what it assumes may be set: {defaults}"
+    meaning = f"how many subjects and surfaces a study needs, by simulation; its assumptions can be set: {defaults}"
     parser.add_argument("--power", nargs="*", metavar="NAME=VALUE", help=meaning)
     meaning = "with --power: how often a study whose subjects press each surface to these depths separates --quantity"
     meaning += " from its rivals; some minutes"
     parse = number_in_range("--depths", float, 0.5, 3.0)
     parser.add_argument("--depths", nargs="+", type=parse, metavar="MM", help=meaning)
-    add_number(parser, "--studies", int, (20, 100_000), "with --power: simulated per design (400)", 400, "N")
-    add_seed(parser, "with --power: of the simulated studies (0)")
+    add_number(parser, "--studies", int, (20, 100_000), "with --power: simulated studies per design (400)", 400, "N")
+    add_seed(parser, "with --power: seed of the simulated studies (0)")
 
 
 def print_power(options: argparse.Namespace, console: Console) -> int:
@@ -153,7 +153,7 @@ EXAMPLE = "daq-app study recordings --out results"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=Path, nargs="?", metavar="FOLDER", help="holds a folder for each session")
+    parser.add_argument("folder", type=Path, nargs="?", metavar="FOLDER", help="contains a folder for each session")
     meaning = "make a study of ten simulated subjects instead"
     add_number(parser, "--synthetic", int, (0, LARGEST_STUDY_SEED), meaning, metavar="SEED")
     meaning = "page, table and results (FOLDER/pooled); with --synthetic the study too"
@@ -163,15 +163,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "workers",
         "scheduler",
         kinematics="as for 'daq-app predict'; finite strain takes ten times as long",
-        paths="also along every other reasonable choice of the analysis: a second or two more a session; with "
+        paths="also with every other reasonable choice of the analysis: a second or two more per session; with "
         "'finite' at finite strain too, up to a minute more",
         tau="as for 'daq-app predict'",
-        quantity="to hold against scores and rivals",
+        quantity="to compare with scores and rivals",
     )
-    meaning = "what the uncertainty of friction makes of each SED (usual at small strain, not at finite strain, where"
+    meaning = "the interval of each SED from the uncertainty of friction (on at small strain; off at finite strain, as"
     parser.add_argument("--intervals", action=argparse.BooleanOptionalAction, help=f"{meaning} it takes longer)")
     add_power(parser)
-    add_analysis(parser, "fixed for all sessions, however each was analysed before")
+    add_analysis(parser, "fixed for all sessions, not as last analysed")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -179,7 +179,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.power is not None:
         return print_power(options, console)
     if options.depths is not None:
-        raise WrongValue("--depths are those of simulated studies: give --power too")
+        raise WrongValue("--depths applies to simulated studies: give --power too")
     if (options.folder is None) == (options.synthetic is None):
         raise WrongValue("give a FOLDER of sessions, or --synthetic SEED, and not both")
     if options.synthetic is None:

@@ -26,17 +26,17 @@ PROGRAM = Path(__file__).parents[2]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("protocol", nargs="?", metavar="PROTOCOL", help="a built-in one, or a TOML file")
+    parser.add_argument("protocol", nargs="?", metavar="PROTOCOL", help="a built-in protocol, or a TOML file")
     parser.add_argument("--program", action="store_true", help="the texts of the subject's page instead")
     parser.add_argument("--window", action="store_true", help="the texts of the experimenter's windows instead")
-    meaning = "two or three small letters, as ISO 639 has them"
+    meaning = "ISO 639 code of the language, in two or three small letters"
     parser.add_argument("--language", required=True, metavar="XX", help=meaning)
     parser.add_argument("--out", type=Path, metavar="FILE", help="a new file (the terminal)")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
     if (options.protocol is not None) + options.program + options.window != 1:
-        raise WrongValue("give a PROTOCOL, --program or --window; one of the three")
+        raise WrongValue("give one of PROTOCOL, --program or --window")
     check_language("--language", options.language)
     if options.window:
         text, gaps = program_texts(EXPERIMENTER, window_texts(), options.language)
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 def protocol_texts(source: Protocol, language: str) -> tuple[str, int]:
     """Return a language's tables, and the number of untranslated blocks. Raises WrongValue for the protocol's own."""
     if language == source.language:
-        raise WrongValue(f"--language {language} is the protocol's own: its texts stand in the blocks")
+        raise WrongValue(f"--language {language} is the protocol's own: its texts are in the blocks")
     earlier = {text.block: text for text in source.translations if text.language == language}
     before = source.pre_evaluation
     texts = [] if before is None else [Translation(language, PRE_EVALUATION, before.instruction)]

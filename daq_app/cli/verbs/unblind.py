@@ -21,7 +21,8 @@ EXAMPLE = "daq-app unblind studies/friction --by E02"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", type=Path, metavar="SESSION|STUDY")
     parser.add_argument("--by", required=True, metavar="CODE", help="who opens the key: a code, never a name")
-    parser.add_argument("--study", type=Path, metavar="DIR", help="of a session that lies elsewhere (the folder above)")
+    meaning = "the study of a session stored elsewhere (the folder above)"
+    parser.add_argument("--study", type=Path, metavar="DIR", help=meaning)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -61,7 +62,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.result({"study": str(folder), "sessions": names, "left_out": refusals, "by": options.by, "utc": utc})
     console.say(f"unblinded by {options.by}: {', '.join(names) or 'the study alone'}", *refusals)
     if not is_study_folder:
-        console.say("labels are the same throughout the study: whoever saw this session's stimuli knows them all")
+        console.say("labels are the same throughout the study: anyone who saw this session's stimuli knows them all")
     return FLAWED if refusals else DONE
 
 
