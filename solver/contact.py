@@ -48,9 +48,9 @@ class FrictionLaw:
     def __post_init__(self) -> None:
         """Raise ValueError for friction that is negative or not a number."""
         if not 0.0 <= self.mu < np.inf:
-            raise ValueError(f"mu = {self.mu} is not allowed: a coefficient of friction is a number from 0 on")
+            raise ValueError(f"mu = {self.mu} is not allowed: a coefficient of friction is 0 or more")
         if not self.tau_max >= 0.0:
-            raise ValueError(f"tau_max = {self.tau_max} is not allowed: a bound is a traction from 0 on, or infinite")
+            raise ValueError(f"tau_max = {self.tau_max} is not allowed: a bound is 0 or more, or infinite")
         object.__setattr__(self, "mu", float(self.mu))  # also from integers: the kernels take floats
         object.__setattr__(self, "tau_max", float(self.tau_max))
 
@@ -103,7 +103,7 @@ class LoadState(NamedTuple):
         """Return a copy with floats, for the kernels. Raises ValueError for values that are not allowed."""
         law = FrictionLaw(float(self.mu), float(self.tau))
         if self.sense not in (-1, 0, 1):
-            raise ValueError(f"sense = {self.sense} is not allowed: friction points along +1 or -1, or is found by 0")
+            raise ValueError(f"sense = {self.sense} is not allowed: give +1 or -1, or 0 to let the solver find it")
         depth, travel = finite("depth", self.depth), finite("travel", self.travel)
         return LoadState(depth, law.mu, law.tau_max, int(self.sense), travel)
 

@@ -93,15 +93,15 @@ class ContactLost(NotConverged):
 def at_end_of_path(depth: float, travel: float, reason: object) -> NotConverged:
     """Return the failure of a load path that ends at a `depth` and a `travel` [mm], before its target.
 
-    >>> str(at_end_of_path(1.5, -0.2, "no equilibrium"))[:67]
-    'the course was followed to 1.5 mm of indentation and 0.2 mm of slid'
-    >>> str(at_end_of_path(-4.754, 0.0, "no equilibrium"))[:75]
-    'the course was followed to where the drag holds the bone 4.754 mm above fir'
+    >>> str(at_end_of_path(1.5, -0.2, "no equilibrium"))[:70]
+    'the load path was followed to 1.5 mm of indentation and 0.2 mm of slid'
+    >>> str(at_end_of_path(-4.754, 0.0, "no equilibrium"))[:78]
+    'the load path was followed to where the drag holds the bone 4.754 mm above fir'
     """
     lift = f"where the drag holds the bone {-depth:.4g} mm above first touch"
     position = f"{depth:.4g} mm of indentation" if depth >= 0.0 else lift
     slip = f" and {abs(travel):.4g} mm of sliding" if travel else ""
     return NotConverged(
-        f"the course was followed to {position}{slip}, and in the smallest steps no further: {reason}; ask for less "
+        f"the load path was followed to {position}{slip}, and the smallest steps failed beyond: {reason}; ask for less "
         "friction, drag or depth."
     )

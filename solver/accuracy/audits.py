@@ -82,7 +82,7 @@ def force_residuals(scene: Scene, normal: float, tangential: float) -> dict[str,
     if drag is not None and scene.friction.mu > 0.0:
         residuals["drag_missed"] = abs(tangential + scene.loading.direction * drag) / (float(scene.friction.mu) * force)
     if max(residuals.values()) > FORCE_RESIDUAL:
-        raise NotConverged("No state was found that has the forces given: give others, or a depth.")
+        raise NotConverged("No state with the given forces was found: change them, or give a depth.")
     return residuals
 
 
@@ -114,8 +114,8 @@ def refuse_unsound(checks: Mapping[str, float], depth: float) -> None:
     """Raise NotConverged where residuals at `depth` [mm] are too large, because of round-off."""
     if (residual := imbalance(checks)) > MAX_RESIDUAL:
         raise NotConverged(
-            f"Forces balance to {residual:.1g} only at {depth:g} mm indentation: round-off has swallowed the answer; "
-            f"contacts far smaller than the mesh, {MIXED} do that."
+            f"Forces balance to {residual:.1g} only at {depth:g} mm indentation: the answer is lost in round-off, "
+            f"as with contacts far smaller than the mesh, {MIXED[:-1]}."
         )
 
 

@@ -100,7 +100,7 @@ def warnings(scene: Scene, left_out: Mapping[str, Any]) -> tuple[str, ...]:
     needs = {
         "bone compliance": 'ask for finger.bone = "meshed"',
         "history": 'ask for solve.course = "history"',
-        "inertia": "nothing here models it",
+        "inertia": "the solver does not model it",
     }
     if scene.solve.course == "history":
         needs["viscosity"] = "give the tissues a Prony series"
@@ -125,7 +125,7 @@ def _strain_warnings(entry: Mapping[str, Any]) -> list[str]:
         return []
     return [
         f"Strains reach {100 * numbers['largest_strain']:.0f} % in the skin and "
-        f"{100 * numbers['strain_at_ending']:.0f} % at the ending, beyond what small strain is meant for: "
+        f"{100 * numbers['strain_at_ending']:.0f} % at the ending, outside the range of small strain: "
         "finite strain would give another answer."
     ]
 
@@ -230,8 +230,8 @@ def _history(scene: Scene, sticking: float, slide: float) -> dict[str, Any]:
         "from": {"sticking_part": sticking, "elastic_slide_mm": slide},
         "how": "the history was marched"
         if stepwise
-        else "part of the touching points that stick: those alone depend on the way, which is forgotten once the bone "
-        "has slid a few times the skin's own sideways displacement",
+        else "part of the touching points that stick: only these depend on the load path, whose effect vanishes once "
+        "the bone has slid a few times the skin's own sideways displacement",
     }
 
 
@@ -305,7 +305,7 @@ def _difference(base: Prediction, variant: Answer | SceneError, variation: str) 
         return {
             "estimate": None,
             "from": {"limit_mu": variant.limit_mu},
-            "how": f"{MEASURED}{variation}: no settled state is there",
+            "how": f"{MEASURED}{variation}: no settled state exists",
         }
     if not isinstance(variant, Prediction):
         return {"how": f"{MEASURED}{variation} was to be measured, but: {variant}"}
@@ -323,7 +323,7 @@ def _beyond_errors(base: Prediction, variant: Answer, variation: str) -> dict[st
     if change > errors:
         return entry
     return {
-        "how": f"{MEASURED}{variation}: {change:.2g}, within both meshes' errors, {errors:.2g}; the estimate stands"
+        "how": f"{MEASURED}{variation}: {change:.2g}, within both meshes' errors, {errors:.2g}; the estimate is kept"
     }
 
 

@@ -51,7 +51,7 @@ def _check_arrays(mesh: Mesh) -> None:
         if numbers.ndim != 1 and name != "elements":
             raise BodyError(f"mesh.{name} has the shape {numbers.shape}; give one row of numbers")
         if name != "region" and numbers.size and not (numbers.min() >= 0 and numbers.max() < count):
-            raise BodyError(f"mesh.{name} names a node that is not there; number the {count} nodes from 0")
+            raise BodyError(f"mesh.{name} names a node that does not exist; number the {count} nodes from 0")
     if len(mesh.region) != len(mesh.elements):
         raise BodyError(f"mesh.region has {len(mesh.region)} entries for {len(mesh.elements)} elements; give one each")
 
@@ -92,7 +92,7 @@ def check_moduli(mesh: Mesh, materials: Sequence[Elasticity]) -> None:
             shear, lame = np.nan, np.nan
         if not (0.0 < shear < np.inf and np.isfinite(lame) and lame > -2.0 / 3.0 * shear):
             raise BodyError(
-                f"material {number}, {material}, is none that can be computed; give one of solver.constitutive, whose "
+                f"material {number}, {material}, cannot be computed; give one of solver.constitutive, whose "
                 "E must be above 0 and nu from 0 to 0.4999999, since nu = 0.5 leaves no energy of volume change"
             )
 

@@ -216,7 +216,7 @@ def _slide_reaching_force(
     """
     depth, most = proof.value, float(proof.numbers[1])
     while most < force:
-        report_progress("trying whether the finger slides deeper than it was followed to", most / force)
+        report_progress("searching for deeper slides", most / force)
         try:
             state = slide_on_branch(finger, state.load._replace(depth=(1.0 + BEYOND_LIMIT) * depth), start=state)
         except NoSteadyState as failure:

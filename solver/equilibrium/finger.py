@@ -60,7 +60,7 @@ class Finger(ABC, Generic[PatchKind]):
             radius = scene.finger.tip_radius
             raise SceneError("finger.tip_radius", radius, f"no mesh fits this finger ({bad})") from bad
         except LinAlgError as bad:
-            raise NotConverged(f"Round-off has swallowed the finger's stiffness ({bad}): {MIXED} do that.") from bad
+            raise NotConverged(f"The finger's stiffness is lost in round-off ({bad}), as with {MIXED[:-1]}.") from bad
 
     @classmethod
     @abstractmethod

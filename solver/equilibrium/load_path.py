@@ -321,7 +321,7 @@ def _slide(path: LoadPath, speed: float, steps: LoadSteps, settled: Callable[[],
         distance += step
         go(distance)
         step = min(step * steps.slide_growth, steps.max_slide_step * depth)
-        report("sliding step by step until nothing changes" + _reason(path), 0.5 + 0.5 * min(distance / longest, 1.0))
+        report("sliding step by step until settled" + _reason(path), 0.5 + 0.5 * min(distance / longest, 1.0))
     beyond = max(0.3 * distance, depth)
     for number in range(1, steps.plateau_steps + 1):
         go(distance + beyond * number / steps.plateau_steps)

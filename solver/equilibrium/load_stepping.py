@@ -233,7 +233,7 @@ def solve_full_slip(
     def step(part: float) -> None:
         nonlocal state
         if part < 1.0:
-            report_progress(f"coming to sliding at mu = {load.mu:.3g} in small steps", part)
+            report_progress(f"approaching full slip at mu = {load.mu:.3g} in small steps", part)
         termination = Termination(tolerance if part == 1.0 else SLIP_CONTROL.intermediate_tolerance)
         state = newton.solve(state, begin.towards(load, part), termination)
 

@@ -38,12 +38,12 @@ from solver.scene import Scene
 SMALL_IMBALANCE = 1e-10  # relative residual of the forces from which a state is refined [-]
 
 UNSTABLE = (
-    "The drag lifts the bone: pressed a little harder, the finger would slide at a smaller depth. Under a weight, that "
-    "follows it down, this slide would not last; held at this depth, the finger slides under less force."
+    "The drag lifts the bone: pressed a little harder, the finger would slide at a smaller depth. Under a constant "
+    "weight this slide is unstable; held at this depth, the finger slides under less force."
 )
 
 BEYOND_THE_SKIN = NotConverged(
-    "The drag lays more skin on the surface than the finger's palmar side has, where contact is looked for: ask "
+    "The drag brings more skin into contact than the finger's palmar side has, where contact is looked for: ask "
     "for less friction, drag or depth."
 )
 

@@ -27,7 +27,7 @@ from solver.scene import Scene
 
 LIMIT_ACCURACY = 0.03  # relative, of a friction limit
 USABLE_ESTIMATE = 0.1  # largest error estimate with which a coarser mesh's answer near a limit is given
-NEAR_LIMIT = "That mesh ends settled sliding at mu = {:.3g}, which is known to {:.0f} %: this state may lie beyond."
+NEAR_LIMIT = "On that mesh settled sliding ends at mu = {:.3g}, which is known to {:.0f} %: this state may lie beyond."
 TOLERANCE_MISSED = "The finest mesh leaves an error estimate above the tolerance, {}."
 # Of a mesh for scenes without a state on the first mesh: a fineness of 8 refuses the same ones of 316 scenes.
 LIMIT_FINENESS = 6.0
@@ -327,7 +327,7 @@ def _sentences(
         if failure.limit_mu is not None:
             warnings.append(NEAR_LIMIT.format(failure.limit_mu, 100.0 * LIMIT_ACCURACY))
     if isinstance(answer, Prediction) and answer.unknown is not None:
-        warnings.append(f"How far this is off is not known, since {answer.unknown}.")
+        warnings.append(f"The error of this answer is not known, since {answer.unknown}.")
     elif error > 1.0 and isinstance(answer, Prediction) and (target := answer.scene.solve.target) is not None:
         warnings.append(TOLERANCE_MISSED.format(percent(target)))
     if isinstance(answer, Prediction):

@@ -97,9 +97,9 @@ def _at_error(
         if best is None:
             return target
         coarse = best.largest_error({}) > error
-        sentence = "no mesh that was tried is below: the best is at"
+        sentence = "no measured mesh is below: the best has"
         if not coarse:
-            sentence = "the truth is too uncertain to tell:"
+            sentence = "the truth is too uncertain to decide:"
         tried = coarse and len(rows) >= len((QUICK if request.quick else MESHES)[kinematics])
         return replace(target, how=f"{sentence} {_error(best, doubts)}", tried=tried)
     took, best = min(accurate, key=lambda pair: pair[0])

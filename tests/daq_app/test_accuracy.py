@@ -261,7 +261,7 @@ def test_an_error_that_the_truth_is_too_uncertain_to_tell_is_neither_met_nor_mis
     rows = {r.at_error: r for r in targets.measure(request) if r.work == "finite strain, one surface"}
     assert rows["0.15 %"].verdict == "aim met"
     assert rows["0.06 %"].verdict == "not measured"
-    assert rows["0.06 %"].how == "the truth is too uncertain to tell: 0.05 %, 0.09 % at most"
+    assert rows["0.06 %"].how == "the truth is too uncertain to decide: 0.05 %, 0.09 % at most"
 
 
 @pytest.mark.usefixtures("published_once")

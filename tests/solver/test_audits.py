@@ -82,5 +82,5 @@ def test_prescribed_forces_are_missed_by_their_own_and_by_what_friction_could_ca
     assert missed == pytest.approx({"normal_force_missed": 1e-9, "drag_missed": 1e-9}, rel=1e-5)
     assert force_residuals(SAMPLE, 0.1, 0.02) == {}
     for normal, drag in ((0.1001, -0.02), (0.1, 0.02)):
-        with pytest.raises(NotConverged, match="No state was found that has the forces given"):
+        with pytest.raises(NotConverged, match="No state with the given forces was found"):
             force_residuals(held, normal, drag)

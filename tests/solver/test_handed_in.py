@@ -62,7 +62,7 @@ def as_other_program_gives(mesh, integers, floats):
         (lambda: linear(replace(MESH, nodes=NAN), TISSUE), "node 0 of the mesh has no finite position"),
         (
             lambda: LinearBody.of(replace(MESH, skin=MESH.skin + 10**6), TISSUE),
-            "mesh.skin names a node that is not there",
+            "mesh.skin names a node that does not exist",
         ),
         (lambda: linear(replace(MESH, skin=MESH.skin[:-1]), TISSUE), "mesh.skin has 4 nodes"),
         (lambda: linear(replace(MESH, skin=MESH.skin[::-1]), TISSUE), "are no free side of an element"),

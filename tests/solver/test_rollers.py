@@ -152,7 +152,7 @@ def test_a_quarter_of_a_thick_cylinder_widens_so_at_finite_strain_under_a_small_
     [
         ({"held_y": np.array([3])}, "held along y; leave its edge out"),
         ({"held": np.empty(0, np.int64), "held_x": np.array([0, 1])}, "leaves the body a motion"),
-        ({"held_x": np.array([10**6])}, "mesh.held_x names a node that is not there"),
+        ({"held_x": np.array([10**6])}, "mesh.held_x names a node that does not exist"),
     ],
 )
 def test_what_is_held_so_that_it_cannot_be_solved_is_refused_in_a_sentence(change, sentence):

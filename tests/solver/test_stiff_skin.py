@@ -70,7 +70,7 @@ def test_a_state_as_near_its_limit_as_limits_are_known_is_told_by_a_coarser_mesh
     failure = NoSteadyState("beyond", limit_mu=0.299)
     end_refinement(monkeypatch, failure, error=return_nine)
     prediction = solve(stiffening_scene(0.3, tolerance))
-    assert "That mesh ends settled sliding at mu = 0.299, which is known to 3 %" in " ".join(prediction.warnings)
+    assert "On that mesh settled sliding ends at mu = 0.299, which is known to 3 %" in " ".join(prediction.warnings)
 
 
 def test_a_number_of_which_little_is_known_near_its_limit_gives_way_to_the_limit(monkeypatch):
