@@ -289,7 +289,7 @@ def visits(
             console.progress(0.95 * count / len(remaining), f"{count} of {len(remaining)} sessions{time_text}")
     except KeyboardInterrupt:
         console.note(
-            f"{len(results)} of {len(folders)} sessions are computed and kept; the next run goes on from there"
+            f"{len(results)} of {len(folders)} sessions are computed and kept; the next run continues from there"
         )
         raise
     return results, failures

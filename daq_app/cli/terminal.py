@@ -23,7 +23,7 @@ _HELP = (
     "undo, of a redo, until the next stroke. "
     "An answer is a number, or 1 or 2 for the first or second of two, or - for no answer."
 )
-PAUSED = "The session is paused. Type resume to go on."
+PAUSED = "The session is paused. Type resume to continue."
 KEYBOARD = "keyboard"
 _CHOICES: dict[float, Literal["first", "second"]] = {1.0: "first", 2.0: "second"}
 _WAYS = {1: "from proximal to distal (away from the subject)", -1: "from distal to proximal (towards the subject)"}
@@ -102,8 +102,8 @@ class Terminal:
                 choices = f"1 for the first ({first.stimulus.code}), 2 for the second ({second.stimulus.code}):"
                 return Prompt(f"{question} {choices}", answer=_choice)
             case steps.AskRest(duration):
-                long = "" if duration is None else f" It goes on by itself after {duration:g} s."
-                return Prompt(f"The subject rests. Press Enter to go on.{long}", steps.Resume())
+                long = "" if duration is None else f" It continues by itself after {duration:g} s."
+                return Prompt(f"The subject rests. Press Enter to continue.{long}", steps.Resume())
             case steps.AskFinish():
                 return Prompt("Every trial is done. Press Enter to end the session.", steps.Finish())
             case _:
@@ -219,7 +219,7 @@ class _Attendance:
             if self._interrupted.pending:
                 self._interrupted.pending = False
                 if self._end is not None:
-                    self._console.note("the recorder goes on sealing the session by itself")
+                    self._console.note("the recorder continues to seal the session by itself")
                     return Outcome(self._end.folder, self._end.end, sealed=False)
                 if self._stopping:
                     self._leave_silent_recorder()

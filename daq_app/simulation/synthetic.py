@@ -86,7 +86,7 @@ def recordings_in(folder: Path) -> Generator[None]:
     If the user stops the work after it has recorded data, raises RecordingKept instead of KeyboardInterrupt.
     """
     if holds_something(folder):
-        raise RecordingError(f"{folder} is not empty; give a new folder, for nothing is written over")
+        raise RecordingError(f"{folder} is not empty; give a new folder, because nothing is overwritten")
     try:
         yield
     except KeyboardInterrupt:

@@ -44,7 +44,7 @@ def export(source: ExportSource, name: str, folder: Path, progress: Progress = l
     The folder appears once it is complete; an interrupted export leaves nothing. Raises ExportError.
     """
     if holds_something(folder):
-        raise ExportError(f"{folder} is not empty; give a new folder, for nothing is written over")
+        raise ExportError(f"{folder} is not empty; give a new folder, because nothing is overwritten")
     with (
         name_failure(ExportError, f"{folder} cannot be written", ", or give another folder", new=True),
         whole_folder(folder) as unfinished,

@@ -89,7 +89,7 @@ def records(path: Path, content: bytes) -> Iterator[tuple[int, list[str]]]:
                 raise ImportRefused(f"{path}, line {empty} is empty: remove it, or what follows it")
             yield reader.line_num, cells
     except csv.Error as error:
-        raise ImportRefused(f"{path}, line {reader.line_num}: this is no CSV ({error}); save the file anew") from error
+        raise ImportRefused(f"{path}, line {reader.line_num}: this is no CSV ({error}); save the file again") from error
 
 
 def cell_text(cell: str) -> str:
@@ -110,7 +110,7 @@ def number_in(cell: str) -> float | None:
 def mend_row(*cells: str) -> str:
     """Return the remedy where cells of a row hold no numbers. A comma may separate thousands or a fraction."""
     commas = any(re.fullmatch(r"[+-]?\d+,\d+", cell.strip()) for cell in cells)
-    return "save the file with decimal points" if commas else "mend or remove the row"
+    return "save the file with decimal points" if commas else "correct or remove the row"
 
 
 _PART = 16_384  # rows in one read
@@ -196,7 +196,7 @@ def displacement_log(path: Path) -> DisplacementLog:
             problem = f"{clock} or {_DISPLACEMENT} is no number; {mend_row(*cells)}"
             raise ImportRefused(f"{path}, line {line}: {problem}")
         if values and time <= values[-1][0]:
-            raise ImportRefused(f"{path}, line {line}: {clock} does not grow; mend or remove the row")
+            raise ImportRefused(f"{path}, line {line}: {clock} does not grow; correct or remove the row")
         width = np.nan if width_position is None else _number(cells, width_position)
         if width <= 0.0:
             raise ImportRefused(f"{path}, line {line}: {_WIDTH} is not above 0; leave the cell empty without a contact")

@@ -134,12 +134,12 @@ def _common_unit(quantity: str, header_units: set[str | None], option: str | Non
     (headed_unit,) = names or (None,)
     unit = headed_unit or option
     if unit is None:
-        raise ColumnsUnknown(f"nothing says in which unit the {quantity} are: give --units, such as --units N,Nmm")
+        raise ColumnsUnknown(f"the unit of the {quantity} is not stated: give --units, such as --units N,Nmm")
     if unit not in factors:
         raise ColumnsUnknown(f'the {quantity} are in "{unit}", which is none of {units}')
     if option is not None and option != unit:
         difference = f"the header has the {quantity} in {unit}, but --units says {option}"
-        raise ColumnsUnknown(f"{difference}: give one of the two up")
+        raise ColumnsUnknown(f"{difference}: leave out one of the two")
     return unit
 
 
@@ -293,19 +293,19 @@ def _times(
         row = int(np.argmax(steps <= 0.0)) + 1
         relation = "repeats" if steps[row - 1] == 0.0 else "lies before"
         raise ImportRefused(
-            f"{path}, line {lines[row]}: the time {relation} that of the row before; mend or remove the row"
+            f"{path}, line {lines[row]}: the time {relation} that of the row before; correct or remove the row"
         )
     rate = 1.0 / float(np.median(steps))
     if options.rate is not None:
         if float(np.ptp(np.percentile(steps, [2, 98]))) * rate > UNEVEN:
             raise SettingsError(
-                f"{path}: --rate {options.rate:g} is refused, for the file's time steps are uneven "
+                f"{path}: --rate {options.rate:g} is refused, as the file's time steps are uneven "
                 f"({1e3 * steps.min():.3g} to {1e3 * steps.max():.3g} ms); leave --rate out and its times are taken as "
                 "they are"
             )
         if abs(options.rate / rate - 1.0) > RATE_TOLERANCE:
             raise SettingsError(
-                f"{path}: --rate {options.rate:g} is refused, for the file's times hold {rate:.4g} readings a second; "
+                f"{path}: --rate {options.rate:g} is refused, as the file's times hold {rate:.4g} readings a second; "
                 "leave --rate out, or name the columns with --axes so that its times are not used"
             )
     return time - time[0], rate, "measured"

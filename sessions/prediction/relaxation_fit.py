@@ -116,7 +116,7 @@ def relaxation(model: PressModel, finger_fit: FingerFit, holds: Sequence[HoldCur
     closed form, as for the stiffness. Raises FitError where no press is held.
     """
     if not holds:
-        raise FitError("No press is held: let the stage stand for half a second or more before it lifts.")
+        raise FitError("No press is held: hold the stage still for half a second or more before it lifts.")
     stiffness = np.array([finger_fit.scene.materials.of(name).E for name in LAYERS])
     elastic = [
         model.force(stiffness, hold.displacement - touch) for hold, touch in zip(holds, finger_fit.touch, strict=True)

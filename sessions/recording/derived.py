@@ -79,7 +79,7 @@ def gain_error_set(folder: Path) -> float | None:
     except (RecordingError, SettingsError) as damaged:
         raise RecordingError(
             f"{folder / GAIN_ERROR} is damaged, and what was set for the session is not known: set it anew with "
-            "'daq-app analyse --calibration-error PERCENT', or delete the file to go on with what is assumed"
+            "'daq-app analyse --calibration-error PERCENT', or delete the file to use the assumed error"
         ) from damaged
 
 

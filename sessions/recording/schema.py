@@ -32,7 +32,7 @@ class NotEmpty(RecordingError):
 
     def __init__(self, folder: Path) -> None:
         """Name the folder."""
-        super().__init__(f"{folder} is not empty; give a new folder, for nothing is written over")
+        super().__init__(f"{folder} is not empty; give a new folder, because nothing is overwritten")
 
 
 FORMAT = "daq-app session"

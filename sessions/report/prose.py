@@ -166,7 +166,7 @@ def summary(report: Report) -> tuple[str, ...]:
     noun = "trial" if any(p.trial is not None for p in report.predictions) else "stroke"
     missing_count = sum(p.sed is None for p in report.predictions)
     if missing_count:
-        sentences.append(f"{plural(missing_count, noun)} got no prediction; the tables say why.")
+        sentences.append(f"{plural(missing_count, noun)} without a prediction; the tables say why.")
     doubtful = sum(bool(p.doubt) for p in report.predictions)
     if doubtful:
         verb = "is" if doubtful == 1 else "are"

@@ -80,7 +80,7 @@ def _relation_sentences(findings: DescriptorFindings, study: StudyFindings) -> l
         trials = Counter(subject for subject, *_ in findings.points)
         if sum(trials.values()) - len(trials) - 1 < 2:
             return [f"{name}: too few subjects with scores and strokes of their own for a correlation within subjects."]
-        return [f"{name}: no correlation within subjects, in none of whom score and {label} both vary."]
+        return [f"{name}: no correlation within subjects, since score and {label} both vary in none of them."]
     repeated = findings.repeated
     interval = f"no interval from {plural(repeated.subjects, 'subject')} with two trials or more"
     if repeated.people is not None:
@@ -155,8 +155,8 @@ def remarks(study: StudyFindings) -> list[str]:
     ]
     sentences += [f"Session {visit.session}: {loss}." for visit in study.visits for loss in visit.losses]
     sentences += [
-        f"The answers of session {visit.session} are {plural(choices, 'choice')} of one of two: they stand in the "
-        "table of trials, no mean or correlation of scores is taken of them, and its strokes count as any other."
+        f"The answers of session {visit.session} are {plural(choices, 'choice')} of one of two: the table of trials "
+        "lists them, no mean or correlation of scores includes them, and its strokes count as any other."
         for visit in study.visits
         if (choices := sum(row.choice is not None for row in visit.rows))
     ]
@@ -167,7 +167,7 @@ def remarks(study: StudyFindings) -> list[str]:
             f"Scored in more than one session: {_first_few(several)}. In means a surface has the subject's mean score; "
             "within subjects every trial counts. Two people under one code would look the same."
         )
-    for outcome, opening in (("not answered", "No score, for the subject did not answer"), ("open", "Not done")):
+    for outcome, opening in (("not answered", "No score, because the subject did not answer"), ("open", "Not done")):
         trials = [f"{v.session} trial {r.trial}" for v in study.visits for r in v.rows if r.outcome == outcome]
         sentences += [f"{opening}: {_first_few(trials)}."] if trials else []
     descriptors = ", ".join(sorted({row.descriptor for visit in study.visits for row in visit.rows})) or "nothing"
@@ -193,8 +193,8 @@ def _meshes(study: StudyFindings) -> list[str]:
     names = "; ".join(f"{value}: {_first_few(sessions)}" for value, sessions in meshes.items())
     sentence = (
         f"The sessions were solved on meshes of {len(meshes)} finenesses ({names}), each as fine as the differences "
-        "between its own trials ask for. Within a subject all trials share one mesh; between subjects an SED may "
-        f"differ for its mesh alone by as much as its estimated error, {_range_of(errors)} of it."
+        "between its own trials require. Within a subject all trials share one mesh; between subjects an SED may "
+        f"differ because of its mesh alone by as much as its estimated error, {_range_of(errors)} of it."
     )
     spreads = [
         surface.response.sd / surface.response.mean

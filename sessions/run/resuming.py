@@ -83,7 +83,7 @@ def check_same_transducer(original: TransducerInfo | None, present: TransducerIn
     """Raise RecordingError unless the transducer is the session's, with the same calibration and rate."""
     if original is None or present is None:
         if original is not present:
-            raise RecordingError("the session began without a transducer, or is to go on without its own")
+            raise RecordingError("the session began without a transducer, or is resumed without its own")
         return
     if present.serial != original.serial:
         raise RecordingError(

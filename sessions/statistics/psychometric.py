@@ -291,7 +291,7 @@ def function_of(answers: Sequence[Comparison], friction: Mapping[tuple[str, int]
         if (session, index) in log_mu and (session, standard) in log_mu
     )
     if answers and not levels:
-        return Psychometric(0, reason="no friction was measured of the standard and of what it was compared with")
+        return Psychometric(0, reason="no comparison has a measured friction of both surfaces")
     return psychometric(
         [
             Level(log_mu[session, index] - log_mu[session, standard], sum(replies), len(replies), order)

@@ -144,7 +144,7 @@ def _no_scale(counts: Array, indices: Sequence[int]) -> str:
         names = ", ".join(str(index) for index, group in zip(indices, label, strict=True) if group == unbeaten)
         return f"no other surface was ever preferred to {names}, so their distance has no bound"
     if np.linalg.matrix_rank(_design(len(indices))[meetings > 0]) < len(indices):
-        return "preference and order cannot be separated: some pairs must be met in both orders"
+        return "preference and order cannot be separated: some pairs must be presented in both orders"
     return ""
 
 
@@ -193,7 +193,7 @@ def _fit(counts: Array, model: Model, start: Array | None = None) -> Array | Non
 def _without_each(counts: Array, model: Model, start: Array) -> tuple[Array, str]:
     """Return the fits without each subject (s, n + 1), and why they give no interval, "" where they do."""
     if len(counts) < LEAST_CASES:
-        return np.zeros((0, 0)), f"an interval over subjects takes {LEAST_CASES} of them"
+        return np.zeros((0, 0)), f"an interval over subjects needs {LEAST_CASES} of them"
     indices, totals = range(counts.shape[2]), counts.sum(axis=0) - counts
     fits = [None if _no_scale(total, indices) else _fit(total, model, start) for total in totals]
     scales = [fit for fit in fits if fit is not None]

@@ -119,7 +119,7 @@ def _other_answers(recording: Recording) -> str:
         answers = f"{choices} choice{plural} of one of two"
     return (
         f"The answers of {recording.plan.subject} in {recording.folder.name} are {answers}: they are kept, and no mean "
-        "or correlation of scores between 0 and 100 is taken of them."
+        "or correlation of scores between 0 and 100 includes them."
     )
 
 

@@ -63,7 +63,7 @@ def exclusion_of(exclusions: tuple[Exclusion, ...], subject: str, descriptor: st
 
 FORM = 12  # version of rows; stored rows of another version are computed again
 STILL_BLINDED = "still blinded, and is not counted until 'daq-app unblind' opens the key"
-NO_INTERVAL = "intervals of the SED were not asked for"
+NO_INTERVAL = "intervals of the SED were not requested"
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ class TrialRow:
     index: Annotated[int, Meaning("", "its maker's number of the surface on the descriptor, 0 to 100")]
     code: Annotated[str, Meaning("", "label on the back of the surface")]
     direction: Annotated[int, Meaning("", "planned: 1 from proximal to distal, -1 back")]
-    repetition: Annotated[int, Meaning("", "how often this surface has been met in the block, from 1")]
+    repetition: Annotated[int, Meaning("", "how often this surface has been presented in the block, from 1")]
     place: Annotated[int, Meaning("", "trials of the block before this one")]
     before: Annotated[int | None, Meaning("", "index stroked just before in the same block; empty for the first")]
     outcome: Annotated[str, Meaning("", "how the trial ended")]
@@ -99,8 +99,8 @@ class TrialRow:
         int | None,
         Meaning("", "index of the surface that all others of the block are compared with; empty where there is none"),
     ] = None
-    rule: Annotated[str, Meaning("", "which mu the model got: maximum, or mean over the steady window")] = ""
-    mu: Annotated[Number, Meaning("", "coefficient of friction that the model got")] = None
+    rule: Annotated[str, Meaning("", "which mu the model used: maximum, or mean over the steady window")] = ""
+    mu: Annotated[Number, Meaning("", "coefficient of friction that the model used")] = None
     mu_low: Annotated[Number, Meaning("", "lower end of its 95 % bootstrap interval")] = None
     mu_high: Annotated[Number, Meaning("", "upper end")] = None
     mu_dynamic: Annotated[Number, Meaning("", "mean of T/N over the steady window")] = None
@@ -121,7 +121,7 @@ class TrialRow:
         Number, Meaning("MPa", "lower end of the 95 % interval that the uncertainty of friction alone makes")
     ] = None
     sed_high: Annotated[Number, Meaning("MPa", "upper end")] = None
-    sed_interval: Annotated[str, Meaning("", "how that interval was found, or why there is none")] = ""
+    sed_interval: Annotated[str, Meaning("", "how that interval was computed, or why there is none")] = ""
     error_estimate: Annotated[Number, Meaning("", "of sed, from its mesh, relative")] = None
     tangential_force: Annotated[Number, Meaning("N", "measured, mean over the steady window")] = None
     responses: Mapping[str, float] = field(default_factory=dict[str, float])  # each quantity at the ending, by name

@@ -278,7 +278,7 @@ def _check(decision: Decision, decisions: Decisions) -> None:
     target = decision.target_text
     kinds = OF_STROKE if decision.stroke is not None else OF_SESSION if decision.trial is None else OF_TRIAL
     if decision.what not in kinds:
-        raise DecisionError(f"nobody decides {decision.what!r} of {target}: give one of {', '.join(kinds)}")
+        raise DecisionError(f"{decision.what!r} of {target} cannot be decided: give one of {', '.join(kinds)}")
     value_kind = kinds[decision.what]
     if not _fits(decision.new, value_kind.form):
         raise DecisionError(f"{decision.what} of {target} cannot be {decision.new!r}: {value_kind.sentence}")

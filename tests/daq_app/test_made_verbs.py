@@ -74,7 +74,7 @@ def test_every_number_of_a_reported_session_has_a_unit_and_an_interval(report_di
     without = {(place.split(",")[1].strip(), why.split(";")[0]) for place, why in notes}
     assert without == {
         ("mean score", "one subject alone has no interval"),
-        ("depth to match", "no interval: found on a rough mesh"),
+        ("depth to match", "no interval: computed on a coarse mesh"),
     }
 
 

@@ -119,9 +119,10 @@ def test_a_pause_is_told_once_with_how_it_ends_and_enter_does_nothing_meanwhile(
     terminal.show(AskStroke(TRIAL))
     for state in ("ready", "paused", "paused"):
         terminal.follow(state)
-    assert out.getvalue().count("The session is paused. Type resume to go on.") == 1
+    assert out.getvalue().count("The session is paused. Type resume to continue.") == 1
     assert terminal.poll() == ()
-    assert out.getvalue().endswith("Nothing is waiting for Enter now. The session is paused. Type resume to go on.\n")
+    answer = "Nothing is waiting for Enter now. The session is paused. Type resume to continue.\n"
+    assert out.getvalue().endswith(answer)
 
 
 def test_a_session_is_ended_for_good_only_with_a_reason():

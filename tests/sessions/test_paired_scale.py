@@ -40,7 +40,7 @@ def test_a_season_of_baseball_has_the_printed_abilities_and_home_advantage():
     assert (worth / worth.sum()).round(3).tolist() == [0.220, 0.190, 0.164, 0.157, 0.137, 0.088, 0.044]
     assert round(scale.first.value, 3) == 0.302
     assert scale.first.low is None
-    assert "takes 3" in scale.interval_reason
+    assert "needs 3" in scale.interval_reason
 
 
 @pytest.mark.parametrize("model", ["Bradley–Terry", "Thurstone V"])

@@ -94,9 +94,9 @@ def test_the_summary_counts_predictions_in_doubt(report):
 
 def test_what_got_no_prediction_is_a_trial_of_a_plan_or_a_stroke_without_one(report):
     without_sed = tuple(replace(p, sed=None) for p in report.predictions[:2])
-    assert "2 trials got no prediction" in " ".join(summary(replace(report, predictions=without_sed)))
+    assert "2 trials without a prediction" in " ".join(summary(replace(report, predictions=without_sed)))
     unplanned = tuple(replace(p, trial=None) for p in without_sed)
-    assert "2 strokes got no prediction" in " ".join(summary(replace(report, predictions=unplanned)))
+    assert "2 strokes without a prediction" in " ".join(summary(replace(report, predictions=unplanned)))
 
 
 def test_two_blocks_of_one_descriptor_are_one_kind_of_judgement_of_the_same_stimuli(report):
@@ -169,7 +169,7 @@ def test_a_depth_without_an_interval_says_whether_its_mesh_is_rough_or_no_interv
         replace(a, interval=None, indentation=first.matching_depth if a.variant == FORCE else a.indentation)
         for a in first.alternatives
     )
-    for alternatives, why in (((), "found on a rough mesh"), (by_force, "none was asked for (--intervals)")):
+    for alternatives, why in (((), "computed on a coarse mesh"), (by_force, "none was asked for (--intervals)")):
         prediction = replace(first, alternatives=alternatives, **unasked)
         table = of_predictions.force_table(replace(report, predictions=(prediction,)))
         assert table.groups[0].rows[0][-1].note.startswith(f"no interval: {why}")

@@ -190,7 +190,7 @@ def test_another_transducer_or_another_rate_is_refused_with_a_sentence():
         check_same_transducer(INFO, dataclasses.replace(INFO, rate=100.0))
     check_same_transducer(None, None)
     for pair in ((INFO, None), (None, INFO)):
-        with pytest.raises(RecordingError, match="began without a transducer, or is to go on without its own"):
+        with pytest.raises(RecordingError, match="began without a transducer, or is resumed without its own"):
             check_same_transducer(*pair)
 
 

@@ -80,7 +80,7 @@ def print_power(options: argparse.Namespace, console: Console) -> int:
     console.say(table(rows, header=["subjects", *(f"{count} surfaces" for count in SURFACES)]))
     console.say(
         "Share of simulated studies whose correlation within subjects has p < 0.05 for other people on the same "
-        f"surfaces, of {options.studies} each. They speak of these surfaces, not of others."
+        f"surfaces, of {options.studies} each. They hold for these surfaces, not for others."
     )
     if recoveries:
         _print_recovery(recoveries, options, console)
@@ -122,7 +122,7 @@ def _print_recovery(recoveries: Sequence[Recovery], options: argparse.Namespace,
     console.say(
         f"Share of {RIVAL_STUDIES} simulated studies in which it has the greatest Akaike weight of all rivals. Its "
         f"twins in the last row, by r of at least {TWIN:g}: {twins}. The finger is the published one, so real studies "
-        "tell less."
+        "distinguish less."
     )
 
 

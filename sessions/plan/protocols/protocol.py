@@ -299,7 +299,7 @@ class Protocol:
         translated: set[tuple[str, str]] = set()
         for number, translation in enumerate(self.translations):
             key, language, block = f"translations[{number}]", translation.language, translation.block
-            allowed = "it is the protocol's own: its texts stand in the blocks"
+            allowed = "it is the protocol's own: its texts are in the blocks"
             check(language != self.language, f"{key}.language", language, allowed)
             check(block in names, f"{key}.block", block, f"it must be one of {', '.join(names)}")
             is_new = (language, block) not in translated

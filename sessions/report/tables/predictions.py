@@ -221,7 +221,7 @@ def force_table(report: Report) -> Table | None:
 
 
 _OF_STATE = ("normal_per_mm", "normal_force", "tangential_force")  # the depth to match belongs to another state
-_ROUGH = "found on a rough mesh; a trial that --variants small solves under the measured force has an interval"
+_ROUGH = "computed on a coarse mesh; a trial that --variants small solves under the measured force has an interval"
 
 
 def direction_table(report: Report) -> Table | None:
@@ -280,7 +280,7 @@ def _rows(report: Report, row: Callable[[PredictionFinding], Row]) -> list[Rows]
 
 
 def _depth(p: PredictionFinding) -> Cell:
-    return number_cell(p.indentation, lambda v: f"{v:g}", "no plan says how deep the model is pressed")
+    return number_cell(p.indentation, lambda v: f"{v:g}", "no plan states the model's depth")
 
 
 def model_mu(stroke: StrokeFinding | None, prediction: PredictionFinding | None) -> tuple[str, float | None]:

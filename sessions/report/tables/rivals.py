@@ -79,7 +79,7 @@ def _alike(name: str, model: str, rivals: Sequence[Rival]) -> list[str]:
     figure_texts = [f"{figure} ({name})" for figure, name in reversed(figures.items())]
     opening = (
         f"{capital(name)}: {names} {order} these {alike[0].n} surfaces as the {model} does, so no order "
-        f"of scores can tell {them} apart from it; "
+        f"of scores can distinguish {them} from it; "
     )
     if not figure_texts:
         return [f"{opening}at the r seen here, no number of surfaces would."]

@@ -48,7 +48,7 @@ def _latent(findings: DescriptorFindings, judgement: Judgement, index: int) -> C
     values = findings.latent.get(judgement)
     estimate = None if values is None else values.get(index)
     if estimate is None:
-        return number_cell(None, str, f"no scale by {judgement}: nobody gave them, too few did, or nothing scatters")
+        return number_cell(None, str, f"no scale by {judgement}: there are none, too few, or they do not scatter")
     return estimate_cell(estimate.value, places(2), None, estimate.ends, "too few subjects")
 
 

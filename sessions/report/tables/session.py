@@ -226,7 +226,7 @@ def rank_interval(relation: Relation) -> Cell:
 
 def _relation_row(name: str, relation: Relation) -> Row:
     without = [(label, NONE if r is None else correlation(r)) for label, r in relation.without]
-    no_slope = "no line has one through two points, or through points wholly on it"
+    no_slope = "no interval of a line through two points, or through points exactly on it"
 
     def in_millionths(slope: float) -> str:
         return significant(1e6 * slope, 3)
