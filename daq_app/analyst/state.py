@@ -258,7 +258,7 @@ def _fold_progress(state: AnalystState, message: Step | Idle | Done | Problem | 
         case Problem(sentence):
             return replace(state, step=None, outcome=sentence)
         case Cancelled():
-            remark = "" if state.report is None else tr(" What was done before is kept.")
+            remark = "" if state.report is None else tr(" Finished results are kept.")
             outcome = tr("Stopped.{kept}", kept=remark)
             return replace(state, step=None, outcome=outcome, halted=state.stage != "predicted")
 

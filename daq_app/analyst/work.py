@@ -241,7 +241,7 @@ class Work:
         if load_path is None:
             raise NothingToShow(prediction.reasons.get("sed") or tr("A history is drawn at small strain only."))
         if load_path.march is None and (prediction.prediction is not None or load_path.scene.materials.relax):
-            raise NothingToShow(tr("The way of tissues that relax is not kept as states that can be drawn."))
+            raise NothingToShow(tr("The load path of tissues that relax has no stored states to draw."))
         sketch, reason = self._sketch(load_path.finger.geometry.mesh, load_path.scene), ""
         progress = self.progress_listener(tr("drawing the history"), len(load_path.march or ()))
         if load_path.march is not None:

@@ -91,7 +91,7 @@ def outdated_prediction(recording: Recording, now: AnalysisSettings) -> str | No
     reasons += ["another seed of the intervals"] if settings.bootstrap_seed != now.bootstrap_seed else []
     if not reasons:
         return None
-    return f"{PREDICTION} was made with {' and '.join(reasons)}: 'daq-app predict' makes it anew"
+    return f"{PREDICTION} was made with {' and '.join(reasons)}: 'daq-app predict' computes it again"
 
 
 def stored_options(recording: Recording, variants: Literal["none", "small", "both"] = "none") -> PredictionOptions:
@@ -126,12 +126,12 @@ def stored_document(folder: Path, name: str) -> dict[str, Any] | None:
             settings_of(document)
             _afferent_of(document)
     except RecordingError as damaged:
-        sentence = str(damaged).replace("make it anew from the recording", f"'daq-app {verb}' makes it anew")
+        sentence = str(damaged).replace("make it anew from the recording", f"'daq-app {verb}' computes it again")
         raise RecordingError(sentence) from damaged
     except (ValueError, AttributeError, TypeError) as damaged:
         usual = "its parts are not of the kinds that this program writes"
         reason = damaged if isinstance(damaged, ValueError) else usual
-        raise RecordingError(f"{folder / name} is damaged ({reason}); 'daq-app {verb}' makes it anew") from damaged
+        raise RecordingError(f"{folder / name} is damaged ({reason}); 'daq-app {verb}' computes it again") from damaged
     return document
 
 
@@ -209,7 +209,7 @@ def changes(name: str, document: Mapping[str, Any], fresh: Mapping[str, Any]) ->
     if not sentences:
         return []
     reason = explain_differences(name, document, software_versions())
-    return [*sentences, f"{reason}; 'daq-app {_VERBS[name]}' makes it anew"]
+    return [*sentences, f"{reason}; 'daq-app {_VERBS[name]}' computes it again"]
 
 
 def _predict(

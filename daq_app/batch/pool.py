@@ -259,9 +259,9 @@ def visits(
     remaining = [folder for folder, visit in by_folder.items() if visit is None]
     for folder in remaining:
         if shelf.file(keys[folder]).exists():
-            console.note(f"{folder.name}: {shelf.file(keys[folder])} is damaged; the session is computed anew")
+            console.note(f"{folder.name}: {shelf.file(keys[folder])} is damaged; the session is computed again")
     if results:
-        console.note(f"{len(results)} of {len(folders)} sessions were computed before and are taken as they are")
+        console.note(f"{len(results)} of {len(folders)} sessions were computed before and are reused")
     key_of = {folder.name: keys[folder] for folder in remaining}
     start = time.monotonic()
     if remaining:

@@ -102,7 +102,7 @@ class Terminal:
                 choices = f"1 for the first ({first.stimulus.code}), 2 for the second ({second.stimulus.code}):"
                 return Prompt(f"{question} {choices}", answer=_choice)
             case steps.AskRest(duration):
-                long = "" if duration is None else f" It continues by itself after {duration:g} s."
+                long = "" if duration is None else f" It continues automatically after {duration:g} s."
                 return Prompt(f"The subject rests. Press Enter to continue.{long}", steps.Resume())
             case steps.AskFinish():
                 return Prompt("Every trial is done. Press Enter to end the session.", steps.Finish())
@@ -219,7 +219,7 @@ class _Attendance:
             if self._interrupted.pending:
                 self._interrupted.pending = False
                 if self._end is not None:
-                    self._console.note("the recorder continues to seal the session by itself")
+                    self._console.note("the recorder continues to seal the session")
                     return Outcome(self._end.folder, self._end.end, sealed=False)
                 if self._stopping:
                     self._leave_silent_recorder()
@@ -238,7 +238,7 @@ class _Attendance:
         if self._start is None:
             raise KeyboardInterrupt
         raise RecordingKept(
-            f"stopped; the recorder does not answer and will end the session by itself; {self._start.folder} keeps it"
+            f"stopped; the recorder does not answer and will end the session on its own, in {self._start.folder}"
         )
 
     def _watch_silence(self) -> None:

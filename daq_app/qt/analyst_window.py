@@ -105,7 +105,7 @@ class AnalystWindow(QMainWindow):
         self.progress = QProgressBar()
         self.progress.setFormat("%p %")
         self.progress.setAccessibleName(tr("progress"))
-        self.stop = button(tr("Stop  Esc"), tr("stop what is being done"), lambda: self.ask(m.Stop()))
+        self.stop = button(tr("Stop  Esc"), tr("stop the work"), lambda: self.ask(m.Stop()))
         name = tr("have the model answer the trials that are left")
         self.go_on = button(tr("Go on"), name, lambda: self.ask(m.GoOn()))
         self.report = button(tr("Report…"), tr("write the report"), self.write_report)

@@ -60,7 +60,7 @@ class BenchPanel(Panel):
         self.search = button(tr("Search"), tr("search for transducers"), search)
         self.connect_button = button(tr("Connect"), tr("connect the chosen transducer"), self.connect_choice)
         self.tare = button(tr("Zero T"), tr("measure the zero of the bench"), lambda: send(Tare()))
-        name = tr("acknowledge overloads: begin to watch anew")
+        name = tr("acknowledge overloads, and watch for new ones")
         self.acknowledge = button(tr("Acknowledge A"), name, lambda: send(AcknowledgeOverloads()))
         self._search_label = label("", "quiet", wrap=True)
         vbox(self._build(), on=self, margins=2)

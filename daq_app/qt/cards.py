@@ -82,8 +82,8 @@ class CutShort(Panel):
         self._sessions = choice(tr("sessions that were cut short"))
         self._description = label("", wrap=True)  # complete, even if the list is narrow
         self._sessions.currentTextChanged.connect(partial(set_text, self._description))
-        name = tr("go on with the session that was cut short")
-        self.go_on = button(tr("Go on with it"), name, lambda: send(ResumeSession(self._sessions.currentData())))
+        name = tr("resume the session that was cut short")
+        self.go_on = button(tr("Resume it"), name, lambda: send(ResumeSession(self._sessions.currentData())))
         heading = label(tr("▲ Sessions that were cut short"), wrap=True)
         fill(QVBoxLayout(self), heading, self._sessions, self._description, self.go_on)
         self._new_list.connect(self.show_sessions, Qt.ConnectionType.QueuedConnection)

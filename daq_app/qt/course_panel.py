@@ -107,7 +107,7 @@ class CoursePanel(Panel):
             return
         entry = None if self._view is None else self._view.buttons[self._act]
         if entry and entry.question and entry.question != self._question_text:  # it would discard another trial
-            self._name_question(entry, tr("The session has gone on meanwhile. {question}", question=entry.question))
+            self._name_question(entry, tr("The session has moved on. {question}", question=entry.question))
             return
         self.leave()
         self._send(MESSAGES[self._act](text))

@@ -21,7 +21,7 @@ TWO_LINES = 4 * GRID  # of small type, before the font's scale [px]
 _ROOM = TARGET + 4  # height of the notice's line, a button and its margins, before the font's scale [px]
 _LEAST = 2 * GRID  # height of the current step without text [px]
 LEGIBLE = 4.0  # to read some twenty words, at five a second [s]
-_STROKES = tr_noop({1: "stroke away from the subject", -1: "stroke towards the subject", 0: "no stroke asked for"})
+_STROKES = tr_noop({1: "stroke away from the subject", -1: "stroke towards the subject", 0: "no stroke requested"})
 _MARKS = {"wrong": "■", "look": "▲"}  # before the sentence of a banner
 
 

@@ -62,7 +62,7 @@ class LiveBar(QWidget):
         self._acts = 0  # width of the buttons with their words and of the drop-down [px]
         self.values: dict[str, QLabel] = {}
         self._captions: dict[str, QLabel] = {}
-        self.hold = button(tr("Hold  H"), tr("hold the picture; readings go on"), hold, checkable=True)
+        self.hold = button(tr("Hold  H"), tr("hold the picture; readings continue"), hold, checkable=True)
         name, text = tr("live model at finite strain"), tr("Finite  M")
         self.finite = button(text, name, lambda: finite(self.finite.isChecked()), checkable=True)
         text = tr("Live model at small strain, or at finite strain where the forces are within its reach")

@@ -178,7 +178,7 @@ class MainWindow(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Close; a session being recorded needs a second request, and can then be resumed."""
-        warning = tr("A session is being recorded: end it with Ctrl+E, or close once more to leave it for later.")
+        warning = tr("A session is being recorded: end it with Ctrl+E, or close again to leave it for later.")
         if self.bridge.recording and self.notice.warning != warning:
             self.notice.warn(warning)
             event.ignore()

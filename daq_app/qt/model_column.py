@@ -56,7 +56,7 @@ class ModelColumn(QWidget):
         texts = {
             tr("Contact"): tr("show the contact alone, with its tractions"),
             tr("Mesh"): tr("show the mesh"),
-            tr("Both"): tr("show the finger of the compared session beside this one"),
+            tr("Both"): tr("show the finger of the compared session next to this one"),
         }
         buttons = (button(text, name, self._paint, "small", checkable=True) for text, name in texts.items())
         self.near, self.mesh, self.together = buttons

@@ -76,7 +76,7 @@ class NewSessionPage(Panel):
         self.screen_fields = ScreenFields(act, self.form)
         meaning = tr("pilot this protocol with simulated hand and answers")
         self._pilot = button(tr("Pilot  F5"), meaning, lambda: act("pilot"))
-        self._pilot.setToolTip(tr("Runs by itself, needs no subject, and is kept apart in the folder “pilots”"))
+        self._pilot.setToolTip(tr("Runs on its own, needs no subject, and is stored separately in the folder “pilots”"))
         meaning = tr("preview every page that the subject will see")
         self._preview = button(tr("Preview  F7"), meaning, lambda: act("preview"))
         self._enrol = button(tr("Enrol"), tr("enrol the subject in the study"), self._enrol_subject)
@@ -141,8 +141,8 @@ class NewSessionPage(Panel):
         text = tr("The subject strokes the transducer and scores.")
         if self.simulated.isChecked():
             text = tr(
-                "Nobody is needed: strokes and scores are simulated, and marked so. "
-                "A sample of your own has the friction that its protocol sets; without, the nearest of ten stands in."
+                "Nobody is needed: strokes and scores are simulated, and marked as such. "
+                "Your own sample has the friction that its protocol sets, or else that of the nearest of ten."
             )
         elif bench.simulated and self.with_forces.isChecked():
             text = tr("A simulated hand strokes when asked; you mount, and you or a subject score.")

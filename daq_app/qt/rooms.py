@@ -46,7 +46,7 @@ _WIDTH = 84  # before the font's scale [px]
 DOCS = Path(__file__).parents[2] / "docs" / "index.md"
 _SESSION = (
     ("redo", tr_noop("Redo…")), ("undo", tr_noop("Undo the last redo")), ("skip", tr_noop("Skip…")),
-    ("pause", tr_noop("Pause or go on")), ("note", tr_noop("Note…")), ("end", tr_noop("End…")),
+    ("pause", tr_noop("Pause or resume")), ("note", tr_noop("Note…")), ("end", tr_noop("End…")),
 )  # fmt: skip
 PANELS = (
     ("bench", tr_noop("Bench")), ("drawer", tr_noop("Drawer: axes, sample, finger")),

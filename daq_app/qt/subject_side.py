@@ -54,7 +54,7 @@ class TabletScreen(QObject):
         if not self.server.code_is_used:
             return tr("Open {url} on the tablet, and type the code {code}.", url=url, code=self.server.code)
         if not self.server.connected:
-            return tr("The tablet is gone. Open {url} on it again; “New code” lets in another.", url=url)
+            return tr("The tablet has disconnected. Open {url} on it again; “New code” admits another.", url=url)
         state = tr("checked") if self._pixels else tr("not checked")
         line = tr("Line of {length:.0f} mm, {checked} with a ruler.", length=LENGTH, checked=state)
         return f"{tr('The tablet shows the page.')} {line}"

@@ -155,8 +155,8 @@ class Recorder(AbstractContextManager["Recorder"]):
         cause = f"exit code {code}" if code is None or code >= 0 else f"signal {-code}"
         return Gone(
             False,
-            f"the recorder has ended unexpectedly ({cause}){detail}: all that it had acknowledged is safe;"
-            " resume the session to go on at the same trial",
+            f"the recorder has ended unexpectedly ({cause}){detail}: everything it acknowledged is safe;"
+            " resume the session to continue at the same trial",
         )
 
     def _write(self) -> None:

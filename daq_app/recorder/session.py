@@ -319,7 +319,7 @@ def _own_transducer(request: m.ResumeSession, recording: Recording, bench: Bench
     """Hold the session's transducer open and yield its info; None for a visit that only scores."""
     if recording.info is None:
         if request.uri is not None:
-            raise NotNow("the session began without a transducer, and goes on without one")
+            raise NotNow("the session began without a transducer, and continues without one")
         yield None
         return
     with bench.instead(request.uri or _recorded_settings(recording).get("device") or recording.info.uri):

@@ -47,7 +47,7 @@ _FLAWS: Mapping[FlawName, tuple[str, str]] = {
     FlawName.DEVICE_FAULT: tr_noop(("the transducer reported a fault", "Check the transducer first.")),
     FlawName.LOST_READINGS: (tr_noop("readings were lost"), ""),
     FlawName.DRIFT: tr_noop(("the zero drifted", "Zero again, hands off.")),
-    FlawName.FROZEN: tr_noop(("the transducer stood still", "Connect the transducer again first.")),
+    FlawName.FROZEN: tr_noop(("the readings froze", "Connect the transducer again first.")),
     FlawName.DEAD: tr_noop(("the transducer is dead", "Connect the transducer again first.")),
 }
 LEAVING = tr_noop("pressed less than half as hard at the end")
@@ -69,7 +69,7 @@ def stroke_quality(block: ReadingBlock, plan: SessionPlan, info: TransducerInfo,
     fell = _fell(stroke)
     if fell is not None and fell >= FELL:
         share = 100 * (1 - fell)
-        at_length = tr("The normal force ended at {share:.0f} % of what it was: the finger was leaving.", share=share)
+        at_length = tr("The normal force fell to {share:.0f} % before the end: the finger was leaving.", share=share)
         refusals = sum(remark.grade == "refused" for remark in remarks)
         remarks.insert(refusals, Remark("doubtful", LEAVING, at_length, PRESS_ON))
     return Quality(tuple(remarks), stroke, analysis.friction[0], fell)

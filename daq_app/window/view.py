@@ -324,7 +324,7 @@ def _banner(state: AppState) -> Banner | None:
         return Banner("wrong", sentence_text)  # the current step's button resumes, if that is possible
     if state.exit_reason is not None and session is not None and session.sealing == "cut short":
         sentence_text = tr(
-            "The recorder has ended while it sealed. Everything is kept: 'daq-app resume --end {folder}' seals it.",
+            "The recorder ended while sealing. Everything is saved: 'daq-app resume --end {folder}' seals it.",
             folder=session.folder,
         )
         return Banner("wrong", sentence_text)
@@ -334,7 +334,7 @@ def _banner(state: AppState) -> Banner | None:
         return Banner("wrong", sentence_text)
     if running and (age := _unheard(state)) > SILENT:
         warning = tr(
-            "Nothing was heard from the recorder for {age:.0f} s: this computer or its disk may be busy. "
+            "The recorder has not answered for {age:.0f} s: this computer or its disk may be busy. "
             "End other programs; what was saved is safe.",
             age=age,
         )
@@ -344,11 +344,11 @@ def _banner(state: AppState) -> Banner | None:
         warning = tr("Overload on {axes}: take the load off and check the transducer.", axes=axes)
         return Banner("wrong", warning, tr("Acknowledge"), m.AcknowledgeOverloads())
     if (failure := state.failure) is not None:
-        text = tr("The session was not taken up again: {why}", why=failure.sentence)
+        text = tr("The session was not resumed: {why}", why=failure.sentence)
         text = sentence(text if failure.request == "ResumeSession" else failure.sentence)
         return Banner("look", text, tr("Dismiss"), Dismissed())
     if state.drawing_error is not None:
-        warning = tr("Something in the window failed ({problem}); the recording goes on.", problem=state.drawing_error)
+        warning = tr("Part of the window failed ({problem}); the recording continues.", problem=state.drawing_error)
         return Banner("look", warning, tr("Dismiss"), Dismissed())
     if bench.link == "none" and bench.problem is not None:
         return Banner("look", tr("No transducer: {problem}", problem=bench.problem))
@@ -358,12 +358,12 @@ def _banner(state: AppState) -> Banner | None:
 def _no_readings(bench: BenchState, *, running: bool) -> str:
     """Return why a transducer that should send does not; empty if it does."""
     if bench.link == "lost":
-        lost = tr(" Readings are being lost; what came before is kept.") if running else ""
+        lost = tr(" Readings are being lost; earlier ones are saved.") if running else ""
         problem = (bench.problem or "").removeprefix("the transducer does not answer; ")  # the banner itself says that
         return tr("The transducer does not answer: {problem}.{lost}", problem=problem, lost=lost)
     if running and _is_silent(bench):
         text = tr("No readings for {age:.0f} s: check power and cable of the transducer.", age=bench.silence)
-        return text + tr(" What came before is kept.")
+        return text + tr(" Earlier readings are saved.")
     return ""
 
 
@@ -374,17 +374,17 @@ def _cut_short(state: AppState, session: SessionState) -> str:
         return ""
     if session.resumable and state.failure is not None and state.failure.request == "ResumeSession":
         reason = state.failure.sentence.rstrip(".")
-        return tr("The session was not taken up again: {why}. {kept}", why=reason, kept=safe)
+        return tr("The session was not resumed: {why}. {kept}", why=reason, kept=safe)
     if session.fault is not None:
         return tr("The recording has stopped: {why}. {kept}", why=session.fault.rstrip("."), kept=safe)
     if end is None or end.cause in ("finished", "aborted", "stopped"):
         return ""
     reason = end.reason
     if end.cause == "device":
-        reason = tr("the transducer fell silent; it answers again") if bench.link == "open" else bench.problem or reason
+        reason = tr("the transducer went silent; it answers again") if bench.link == "open" else bench.problem or reason
     if end.cause == "disk":  # its reason names the safe data
         return tr("The session was cut short: {why}.", why=reason)
-    return tr("The session was cut short: {why}. Everything until then is kept.", why=reason)
+    return tr("The session was cut short: {why}. Everything until then is saved.", why=reason)
 
 
 def duration(seconds: float) -> str:

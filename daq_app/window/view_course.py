@@ -121,7 +121,7 @@ def course_view(session: SessionState, bench: BenchState, now: float) -> CourseV
         primary=primary,
         direction=trial.trial.direction if trial is not None and session.phase in IN_A_TRIAL else 0,
         timer="" if over else f"{wait_s // 60}:{wait_s % 60:02d}",
-        notice=tr("It is kept in {folder}", folder=session.folder) if over else session.notice or _undo_text(session),
+        notice=tr("It is stored in {folder}", folder=session.folder) if over else session.notice or _undo_text(session),
         rows=_rows(session),
         tiles=tiles(session),
         stroke=stroke,
@@ -147,7 +147,7 @@ def _buttons(session: SessionState, trial: TrialState | None) -> dict[str, Butto
     return {
         "skip": Button(tr("Skip"), "S", trial is not None and phase in IN_A_TRIAL, question=why_skip),
         "pause": Button(tr("Resume"), "P", sends=steps.Resume()) if phase == "paused" else pause,
-        "note": Button(tr("Note"), "N", not session.is_over, question=tr("Note, kept with its time:")),
+        "note": Button(tr("Note"), "N", not session.is_over, question=tr("Note, stored with its time:")),
         "no answer": Button(tr("No answer"), key, phase == "scoring", NO_ANSWER.get(type(session.command))),
         "end": Button(tr("New"), "Ctrl+N", sends=NewSession()) if session.is_over else end,
         "undo": Button(undo, "Ctrl+Z", bool(session.redone) and phase in BEFORE_STROKE, steps.UndoRedo()),
@@ -183,7 +183,7 @@ def _to_do(session: SessionState, bench: BenchState) -> tuple[str, Button | None
         case "idle":
             return tr("Everything is set up. Press Space to begin."), Button(tr("Begin"), "Space", sends=steps.Begin())
         case "paused":
-            return tr("Paused. Press Space to go on."), Button(tr("Resume"), "Space", sends=steps.Resume())
+            return tr("Paused. Press Space to continue."), Button(tr("Resume"), "Space", sends=steps.Resume())
         case "resting":
             return _to_do_in_rest(session)
         case "resuming":
@@ -236,7 +236,7 @@ def _answer_sentence(session: SessionState, code: str) -> str:
 
 def _to_do_in_rest(session: SessionState) -> tuple[str, Button]:
     duration = session.command.duration if isinstance(session.command, steps.AskRest) else None
-    by_itself = "" if duration is None else tr(" It goes on by itself after {duration:g} s.", duration=duration)
+    by_itself = "" if duration is None else tr(" It continues automatically after {duration:g} s.", duration=duration)
     return tr("The subject rests.{by_itself}", by_itself=by_itself), Button(tr("Go on"), "Space", sends=steps.Resume())
 
 
@@ -258,7 +258,7 @@ def _to_do_at_end(session: SessionState) -> tuple[str, Button | None]:
         return tr("The session is being ended."), None
     if session.resumable:
         resume = Button(tr("Resume session"), "Space", sends=m.ResumeSession(session.folder))
-        return tr("The session was cut short and can go on at the same trial."), resume
+        return tr("The session was cut short and can be resumed at the same trial."), resume
     count = sum(t.outcome == "done" for t in session.trials)
     sentence = tr("Session ended. Trials done: {done} of {count}.", done=count, count=len(session.trials))
     return sentence, Button(tr("New session"), "Space", sends=NewSession())

@@ -145,7 +145,7 @@ def test_a_number_that_is_withheld_says_why(state):
         (m.Write("csv", "out"), True, ""),
         (m.Idle(), False, ""),
         (m.Problem("No."), False, "No."),
-        (m.Cancelled(), False, "Stopped. What was done before is kept."),
+        (m.Cancelled(), False, "Stopped. Finished results are kept."),
     ],
 )
 def test_what_was_found_stays_whatever_comes_after(state, message, going_on, outcome):

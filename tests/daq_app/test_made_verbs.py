@@ -256,7 +256,7 @@ def test_a_decision_is_recorded_listed_followed_by_every_verb_and_undone(small, 
     # It is made once more under its own decisions, and nothing else differs.
     checksum, older_result = answer(capsys)["problems"]
     assert "SHA-256 or size differs from MANIFEST.json" in checksum
-    assert older_result == "analysis.json was made under other decisions than those in force: make it anew"
+    assert older_result == "analysis.json was made under other decisions than those in force: compute it again"
     for number in ("1", "2"):
         assert run([*decide, "--undo", number]) == 0
         capsys.readouterr()

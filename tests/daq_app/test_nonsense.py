@@ -19,7 +19,7 @@ from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import reveal
 from sessions.statistics.findings import check_ground_truth, effect_recoveries, flaw_detections, friction_recovery
 
-VERB = {ANALYSIS: "'daq-app analyse' makes it anew", PREDICTION: "'daq-app predict' makes it anew"}
+VERB = {ANALYSIS: "'daq-app analyse' computes it again", PREDICTION: "'daq-app predict' computes it again"}
 NONSENSE = st.sampled_from([None, "x", "", -7, 0.5, True, [], {}, [None], {"a": 1}, [[1, 2, 3]], "delete"])
 
 

@@ -119,10 +119,10 @@ def test_a_pause_is_told_once_with_how_it_ends_and_enter_does_nothing_meanwhile(
     terminal.show(AskStroke(TRIAL))
     for state in ("ready", "paused", "paused"):
         terminal.follow(state)
-    assert out.getvalue().count("The session is paused. Type resume to continue.") == 1
+    paused = "The session is paused. Type resume to continue."
+    assert out.getvalue().count(paused) == 1
     assert terminal.poll() == ()
-    answer = "Nothing is waiting for Enter now. The session is paused. Type resume to continue.\n"
-    assert out.getvalue().endswith(answer)
+    assert out.getvalue().endswith(f"Nothing is waiting for Enter now. {paused}\n")
 
 
 def test_a_session_is_ended_for_good_only_with_a_reason():
@@ -210,7 +210,7 @@ def test_a_second_ctrl_c_leaves_a_recorder_that_does_not_answer_and_it_ends_the_
     os.killpg(process.pid, signal.SIGINT)
     _, output = process.communicate()
     assert process.returncode == 3
-    assert f"{folder} keeps it" in output
+    assert f"on its own, in {folder}\n" in output
     assert Recording.open(folder).end is None
     os.kill(recorder, signal.SIGCONT)
     while not (folder / "MANIFEST.json").exists():

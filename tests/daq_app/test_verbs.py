@@ -84,7 +84,7 @@ def test_verify_names_a_derived_number_that_comes_out_otherwise(session, capsys)
     assert run(["verify", str(session), "--json"]) == 3
     *_, difference, remedy = answer(capsys)["problems"]
     assert "strokes[1].mu_dynamic" in difference
-    assert remedy.endswith("'daq-app analyse' makes it anew")
+    assert remedy.endswith("'daq-app analyse' computes it again")
     assert run(["analyse", str(session)]) == run(["verify", str(session)]) == 0
 
 

@@ -136,7 +136,7 @@ def test_what_was_kept_and_is_not_as_it_was_written_is_named_and_computed_anew(p
         patch.setattr(pooling, "_in_pool", lambda *_: iter([("S01", visit)]))
         results, _ = visits([study / "S01"], STEADY, shelf, Console(as_json=True))
     assert results[0].rows[0].mu == visit["rows"][0]["mu"]
-    assert f"{key}.json is damaged; the session is computed anew" in capsys.readouterr().err
+    assert f"{key}.json is damaged; the session is computed again" in capsys.readouterr().err
     assert shelf.file(key).read_bytes() == whole
 
 

@@ -76,7 +76,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.result({"decision": line.to_dict(), "changes": changes, "prediction_is_older": older})
     console.say(recording.simulated_sentence, line.sentence, *changes)
     if older:
-        console.say(f"{PREDICTION} was made before this decision: 'daq-app predict' makes it anew")
+        console.say(f"{PREDICTION} was made before this decision: 'daq-app predict' computes it again")
     return DONE
 
 

@@ -44,7 +44,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
             if document is None:
                 continue
             if not is_current(document, decisions):
-                flaws.append(f"{name} was made under other decisions than those in force: make it anew")
+                flaws.append(f"{name} was made under other decisions than those in force: compute it again")
             made_with = replace(decisions_of(document), problems=decisions.problems)
             fresh = repeat(name, document, recording, made_with)
         except (RecordingError, SettingsError) as damaged:

@@ -135,7 +135,7 @@ def test_an_error_while_drawing_is_said_and_the_session_goes_on(driver, monkeypa
     monkeypatch.setattr(driver.window.live, "draw", fails)
     monkeypatch.setattr(driver.window.bridge.model, "add", fails)
     driver.until(lambda: driver.view.banner is not None, "the banner")
-    assert "the recording goes on" in driver.view.banner.sentence
+    assert "the recording continues" in driver.view.banner.sentence
     one_trial(driver, stays=False)
     assert driver.view.lamp.grade == "on"
 
@@ -160,7 +160,7 @@ def test_closing_while_a_session_is_recorded_asks_once_and_leaves_a_session_that
     window = driver.window
     window.close()
     assert window.isVisible()
-    assert "close once more" in window.notice._label.text()
+    assert "close again" in window.notice._label.text()
     driver.go_on("scoring")
     driver.until(lambda: window.notice._label.text() == "", "the session goes on: nothing is asked any more")
     monkeypatch.setattr(window.bridge, "end", lambda: None)
@@ -169,7 +169,7 @@ def test_closing_while_a_session_is_recorded_asks_once_and_leaves_a_session_that
         event = QCloseEvent()
         window.closeEvent(event)
         assert event.isAccepted() is leaves
-        assert "close once more" in window.notice._label.text()
+        assert "close again" in window.notice._label.text()
 
 
 @pytest.mark.usefixtures("application")
@@ -178,9 +178,9 @@ def test_a_question_stays_long_enough_to_be_read_while_a_pilot_goes_on(monkeypat
     monkeypatch.setattr(header, "monotonic", lambda: time[0])
     notice = Notice(print)
     notice.show_view(None, "", "stroke")
-    notice.warn("close once more")
+    notice.warn("close again")
     notice.show_view(None, "", "score")
-    assert notice.warning == "close once more"
+    assert notice.warning == "close again"
     time[0] += header.LEGIBLE
     notice.show_view(None, "", "score")
     assert notice.warning == ""
@@ -199,7 +199,7 @@ def test_the_warning_of_a_tablet_gives_way_to_others_and_goes_when_it_answers_ag
     assert "tablet does not answer" in window.notice._label.text()
     window.close()
     window.show_view(driver.view)
-    assert "close once more" in window.notice._label.text()
+    assert "close again" in window.notice._label.text()
     window.notice.warn("")
     window.show_view(driver.view)
     server.connected = True
@@ -251,12 +251,12 @@ def test_what_is_below_the_sentence_stays_in_place_when_a_shorter_one_comes(driv
 def test_a_warning_stands_beside_a_banner_and_gives_way_to_what_the_session_says(driver):
     notice, banner = driver.window.notice, Banner("wrong", "The transducer does not answer: no readings for 1 s.")
     notice.show_view(banner, "", "Mount")
-    notice.warn("Close once more.")
+    notice.warn("Close again.")
     for seconds in (2, 3):  # the banner counts
         sentence = f"The transducer does not answer: no readings for {seconds} s."
         notice.show_view(replace(banner, sentence=sentence), "", "Mount")
         assert "does not answer" in notice._label.text()
-        assert notice._label.text().endswith("Close once more.")
+        assert notice._label.text().endswith("Close again.")
     notice.show_view(None, "To be done again: trial 5 (K50).", "Mount")
     assert notice._label.text() == "To be done again: trial 5 (K50)."
 

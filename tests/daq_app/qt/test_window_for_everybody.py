@@ -111,7 +111,8 @@ def test_what_to_do_now_is_whole_in_the_lowest_window_with_a_banner_of_three_lin
     window = driver.window
     window.resize(683, 384)
     window.notice.warn("The session was cut short. " * 6)
-    window.to_do.show_what("The session was cut short and can go on at the same trial.", Button("Resume", "Space"), 0)
+    sentence = "The session was cut short and can be resumed at the same trial."
+    window.to_do.show_what(sentence, Button("Resume", "Space"), 0)
     window.to_do.second.show()
     driver.application.processEvents()
     sentence, first, second = window.to_do.sentence, window.to_do.primary, window.to_do.second

@@ -84,7 +84,7 @@ def test_a_resumption_that_fails_says_why_and_can_be_tried_again():
 def test_a_session_of_another_day_that_is_not_taken_up_again_is_named_as_such():
     failure = m.Failed("ResumeSession", "nothing answers at 192.168.1.1; sim: is connected again", "LinkLost")
     banner = derive_view(after(failure)).banner
-    assert banner.sentence == f"The session was not taken up again: {failure.sentence}."
+    assert banner.sentence == f"The session was not resumed: {failure.sentence}."
     assert banner.grade == "look"
 
 

@@ -195,7 +195,7 @@ def test_a_session_that_has_ended_shows_no_recording():
             "Fz",
             m.AcknowledgeOverloads(),
         ),
-        ((*MOUNT, DrawingFailed("ValueError: x")), "look", "the recording goes on", Dismissed()),
+        ((*MOUNT, DrawingFailed("ValueError: x")), "look", "the recording continues", Dismissed()),
         ((*MOUNT, m.Gone(False, "the recorder has ended unexpectedly (signal 9)")), "wrong", "signal 9", None),
         ((*MOUNT, m.Failed("StartSession", "the disk is full", "RecordingError")), "wrong", "the disk is full", None),
         (CUT_SHORT, "wrong", "the cable was pulled", None),
@@ -242,7 +242,7 @@ def test_an_error_while_saving_ends_the_course_and_puts_the_lamp_to_wrong():
 
 def test_a_recorder_that_is_silent_in_a_session_is_said_to_be_silent():
     state = after(Tick(100.0), *MOUNT, status(1_000), Tick(105.0))
-    assert "Nothing was heard from the recorder for 5 s" in derive_view(state).banner.sentence
+    assert "The recorder has not answered for 5 s" in derive_view(state).banner.sentence
 
 
 def test_no_reading_counts_as_of_now_once_the_recorder_is_dead_or_not_heard():
