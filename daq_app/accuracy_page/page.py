@@ -88,7 +88,7 @@ def _machine(results: RunResults) -> Table:
             ("begun", f"{results.begun} UTC"), ("system", row.system),
             ("processor", f"{row.processor}, {row.cores} cores"),
             ("threads of linear algebra", row.threads),
-            ("processes wanting a core before it began", "not known" if row.load is None else f"{row.load:.2f}"),
+            ("running processes before the start", "not known" if row.load is None else f"{row.load:.2f}"),
             ("took", f"{sum(results.took_s.values()):.0f} s" + (", stopped by hand" if results.stopped else "")),
             *row.versions.items(),
             *(("not measured", sentence) for sentence in results.left_out),

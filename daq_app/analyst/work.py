@@ -236,7 +236,7 @@ class Work:
     def _film(self, key: m.Key) -> None:
         entry = self._load_paths.get(key)
         if entry is None:
-            raise NothingToShow(tr("The model has no way to show for this trial: it was not solved."))
+            raise NothingToShow(tr("The model has no load path to show for this trial: it was not solved."))
         prediction, load_path = entry
         if load_path is None:
             raise NothingToShow(prediction.reasons.get("sed") or tr("A history is drawn at small strain only."))

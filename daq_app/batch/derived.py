@@ -272,7 +272,7 @@ def open_visit(
     """
     if is_study(path):
         if subject is None:
-            raise WrongValue(f"{path} is a study: say whose visit with --subject")
+            raise WrongValue(f"{path} is a study: choose the subject with --subject")
         sessions, unreadable = sessions_of(path)
         console.note(*unreadable)
         visit = force_visit(sessions, subject)

@@ -319,7 +319,7 @@ def by_processes(work: Callable[..., A], jobs: Jobs, workers: int | None) -> Gen
             try:
                 yield from _in_pool(work, {name: arguments}, 1)
             except BrokenProcessPool:
-                yield name, Lost("the process that computed it died, perhaps for want of memory")
+                yield name, Lost("the process that computed it died, perhaps from lack of memory")
 
 
 def _in_pool(work: Callable[..., A], jobs: Jobs, workers: int | None) -> Generator[tuple[str, A]]:

@@ -81,7 +81,7 @@ def check_design(design: Mapping[str, Any], scene: Scene, file: str) -> dict[str
     ranges: dict[str, tuple[float, float]] = {}
     for name, span in design.items():
         if _value(scene, name) is None:
-            raise SettingsError(f"{file}: {name} is no number of this scene; a dotted key such as friction.mu is one")
+            raise SettingsError(f"{file}: {name} is not a number of this scene; use a dotted key such as friction.mu")
         try:
             low, high = as_type(span, tuple[float, float])
         except ValueError:

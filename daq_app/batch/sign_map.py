@@ -192,7 +192,7 @@ def _load_answers(keep: Path | None) -> dict[str, Any]:
     """Return the answers in a file, without a line that a crash cut short. Raises OSError."""
     content = keep.read_bytes().strip() if keep is not None and keep.exists() else b""
     if content and not content.startswith(b'{"key": "'):  # never append to another kind of file
-        raise OSError(errno.EEXIST, "it holds something else than answers", str(keep))
+        raise OSError(errno.EEXIST, "it does not hold answers", str(keep))
     answers: dict[str, Any] = {}
     for line in content.splitlines():
         with suppress(ValueError, KeyError):

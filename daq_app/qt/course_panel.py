@@ -32,7 +32,7 @@ class CoursePanel(Panel):
         self._view: CourseView | None = None
         self._act = ""
         self._question_text = ""  # the question above the line
-        self.plan = row_list(tr("plan: trials done, in hand and coming"))
+        self.plan = row_list(tr("plan: trials done, current and to come"))
         self.buttons = {act: button("", tr(_DESCRIPTIONS[act]), partial(self.ask, act), "small") for act in ACTS}
         self.line = EntryLine(self._keep, self.leave)
         self.line.setAccessibleName(tr("reason or note"))

@@ -151,8 +151,8 @@ class MainWindow(QMainWindow):
             "leave": self._leave,
             **{f"go to {room}": partial(self.go_to, room) for room in ROOMS},
             THEME: self.theme_chosen.emit,
-            SCALE: lambda: self.notice.warn(tr("The size of type that was chosen holds from the next start on.")),
-            LANGUAGE: lambda: self.notice.warn(tr("The language that was chosen holds from the next start on.")),
+            SCALE: lambda: self.notice.warn(tr("The chosen type size applies from the next start on.")),
+            LANGUAGE: lambda: self.notice.warn(tr("The chosen language applies from the next start on.")),
             "quit": self.close,
         }
 
@@ -220,7 +220,7 @@ class MainWindow(QMainWindow):
             bench = bench_of(self.bridge.state.bench)
             self._begin(pilot_form(self.page.form(), bench), bench)
         else:
-            self.notice.warn(tr("A protocol is piloted in Prepare, while no session is in hand."))
+            self.notice.warn(tr("A protocol is piloted in Prepare, while no session is running."))
 
     def _preview(self) -> None:
         if refusal := open_preview(self.page.form(), self.subject.size(), self):
@@ -270,7 +270,7 @@ class MainWindow(QMainWindow):
 
     def _subject_closed(self) -> None:
         if self.bridge.recording:
-            self.notice.warn(tr("The subject's window was closed; F6 brings it again."))
+            self.notice.warn(tr("The subject's window was closed; F6 opens it again."))
 
     def _warn_of_tablet(self) -> None:
         warning = tr("The tablet does not answer. It keeps its answers; F6 shows the subject's page here.")

@@ -38,7 +38,7 @@ Room = Literal["prepare", "run", "review"]
 ROOMS: tuple[Room, ...] = ("prepare", "run", "review")
 WHY_NOT = {
     "prepare": tr_noop("A session is being recorded: end it before the next is prepared."),
-    "run": tr_noop("No session is in hand: start one in Prepare."),
+    "run": tr_noop("No session is running: start one in Prepare."),
 }
 KEY_OF = {key.act: key.key for key in KEYS}
 ROOM_NAMES: Mapping[Room, str] = {"prepare": tr_noop("Prepare"), "run": tr_noop("Run"), "review": tr_noop("Review")}

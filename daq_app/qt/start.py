@@ -63,7 +63,7 @@ def window(arguments: list[str]) -> int:
             ("daq_app.recorder.client", "daq_app.tablet.server", "daq_app.window.state"),
         )
     if not folder.is_dir():
-        return _fail(f"{folder} is no folder: give a session's folder")
+        return _fail(f"{folder} is not a folder: give a session's folder")
 
     def analyst(application: "QApplication") -> "AnalystWindow":
         from daq_app.qt.analyst_window import AnalystWindow

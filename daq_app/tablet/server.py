@@ -189,7 +189,7 @@ class TabletServer:
             self._on_change()
         if in_use:
             return "Another device shows this page. Ask for a new code."
-        return "This is not the code." if hello.code else "Another code holds now."
+        return "This is not the code." if hello.code else "Another code is now valid."
 
 
 def own_address() -> str:
@@ -207,10 +207,10 @@ def _listen(address: str, port: int) -> socket.socket:
     try:
         private = ipaddress.IPv4Address(address).is_private and address != "0.0.0.0"
     except ValueError as error:
-        raise NoTabletServer(f"{address} is no IPv4 address: give this machine's, such as 192.168.1.20") from error
+        raise NoTabletServer(f"{address} is not an IPv4 address: give this machine's, such as 192.168.1.20") from error
     if not private:
         raise NoTabletServer(
-            f"{address} is no address of a private network: the subject's page is served in the lab alone;"
+            f"{address} is not an address of a private network: the subject's page is served only in the lab;"
             " give --subject-address with this machine's address there"
         )
     for candidate in (port, 0):
@@ -218,7 +218,7 @@ def _listen(address: str, port: int) -> socket.socket:
             return socket.create_server((address, candidate))
         except OSError as error:
             refusal = error
-    raise NoTabletServer(f"{address} is no address of this machine ({refusal.strerror}); give --subject-address")
+    raise NoTabletServer(f"{address} is not an address of this machine ({refusal.strerror}); give --subject-address")
 
 
 def _new_code() -> str:

@@ -180,7 +180,7 @@ class Judge:
         if error := answer.exception():
             self._worker = None  # the next stroke starts another
             name = type(error).__name__
-            self._send(DrawingFailed(tr("a stroke was not looked at: {name} {error}", name=name, error=error)))
+            self._send(DrawingFailed(tr("a stroke was not examined: {name} {error}", name=name, error=error)))
         elif (judgement := answer.result()) is not None:
             self._send(judgement)
 

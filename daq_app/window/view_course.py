@@ -187,7 +187,7 @@ def _to_do(session: SessionState, bench: BenchState) -> tuple[str, Button | None
         case "resting":
             return _to_do_in_rest(session)
         case "resuming":
-            return tr("Wait: the session is being taken up again."), None
+            return tr("Wait: the session is being resumed."), None
         case "closing":
             finish = Button(tr("End session"), "Space", sends=steps.Finish())
             return tr("Every trial is done. Press Space to end the session."), finish
@@ -202,7 +202,7 @@ def _to_do_in(trial: Trial, session: SessionState) -> tuple[str, Button | None]:
     code = trial.stimulus.code
     match session.phase:
         case "mounting":
-            next_step = tr("to zero") if session.plan.forces else tr("to go on")
+            next_step = tr("to zero") if session.plan.forces else tr("to continue")
             label = tr("Zero") if session.plan.forces else tr("Mounted")
             practice = "" if trial.phase == "main" else f"{trial.phase.capitalize()}: "
             sentence = tr(
@@ -373,4 +373,4 @@ def _why_none(session: SessionState, trial: TrialState) -> str:
         return tr("Its stroke is still to come.")
     if trial.outcome == "skipped":
         return tr("It was left out: no stroke of it counts.")
-    return tr("Its stroke was recorded, and this window has not looked at it: Review shows it after the session.")
+    return tr("Its stroke was recorded, but this window has not examined it: Review shows it after the session.")

@@ -170,7 +170,7 @@ def _dies(_):
 @pytest.mark.skipif(os.name != "posix", reason="kills a process")
 def test_a_process_that_dies_over_a_finger_ends_in_a_sentence(monkeypatch):
     monkeypatch.setattr(sign_map, "finger_answer", _dies)
-    with pytest.raises(TooFewAnswers, match="died, perhaps for want of memory"):
+    with pytest.raises(TooFewAnswers, match="died, perhaps from lack of memory"):
         sign_map.answers_of(list(sign_map.single_changes("small").values())[:1], lambda _: None, workers=1)
 
 

@@ -63,7 +63,7 @@ def _docs(options: argparse.Namespace, page_tables: "Mapping[str, Table]") -> di
     try:
         return filled_pages(options.docs, page_tables)
     except ValueError as error:
-        raise WrongValue(f"{options.docs} holds no docs of this program ({error}); give another folder") from error
+        raise WrongValue(f"{options.docs} is not the docs folder ({error}); give another folder") from error
 
 
 def _measure_or_restore(options: argparse.Namespace, console: Console) -> "RunResults":
@@ -80,4 +80,4 @@ def _measure_or_restore(options: argparse.Namespace, console: Console) -> "RunRe
     try:
         return restore(json_object(content))
     except (ValueError, KeyError, TypeError) as error:
-        raise WrongValue(f"{options.data} is no accuracy.json of this program ({error}); give another file") from error
+        raise WrongValue(f"{options.data} is not an accuracy.json ({error}); give another file") from error

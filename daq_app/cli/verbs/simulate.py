@@ -56,5 +56,5 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 def _port(text: str) -> int:
     if not (text.isdecimal() and 0 <= int(text) <= 65535):
-        raise argparse.ArgumentTypeError(f"{text} is no port: give a number from 0 (any free port) to 65535")
+        raise argparse.ArgumentTypeError(f"{text} is not a port: give a number from 0 (any free port) to 65535")
     return int(text)

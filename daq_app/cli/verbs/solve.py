@@ -27,15 +27,15 @@ AUDITS = {
     "equilibrium_x": "forces along the surface are out of balance by",
     "equilibrium_y": "forces across the surface are out of balance by",
     "work_balance": "work of the contact forces and energy of the tissue differ by",
-    "penetration": "the skin lies too low by, of the indentation",
+    "penetration": "the skin penetrates the surface by, of the indentation",
     "cone_violation": "friction exceeds its law by, of the largest force on a node",
     "normal_force_missed": "the normal force given is missed by, of it",
     "drag_missed": "the drag given is missed by, of what friction could carry",
     "course_work_balance": "of the bone's work on its way, neither stored nor lost to friction",
     "course_step_work": "of the bone's work on its way, left open by the size of the steps",
-    "course_viscous_work": "of the bone's work on its way, taken by tissues that relax",
+    "course_viscous_work": "of the bone's work on its way, dissipated by tissues that relax",
     "course_least_dissipation": "least work that friction took in a step, of the bone's work",
-    "smallest_det_F": "smallest ratio of a volume to what it was",
+    "smallest_det_F": "smallest ratio of a volume to its original value",
 }
 
 

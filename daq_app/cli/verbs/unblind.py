@@ -32,7 +32,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     folder = path if is_study_folder else options.study or path.resolve().parent
     sessions, unreadable = sessions_of(path) if is_study_folder else ((Recording.open(path),), ())
     if not is_study_folder and sessions[0].plan.blinded and not is_study(folder):
-        raise StudyError(f"{folder} is no study: name the folder of the study that {path.name} belongs to with --study")
+        raise StudyError(f"{folder} is not a study: give the folder of {path.name}'s study with --study")
     key = study_key(folder) if is_study_folder or sessions[0].plan.blinded else None
     if key is None:
         raise StudyError(f"{path} is not blinded: there is nothing to open")

@@ -217,7 +217,7 @@ def test_on_a_second_screen_the_subject_sees_every_page_from_the_first_on_and_th
     assert "Keep your fingers off" in window.subject._text.text()
     assert window.subject.testAttribute(Qt.WidgetAttribute.WA_ShowWithoutActivating)
     window.subject.close()
-    assert "F6 brings it again" in window.notice._label.text()
+    assert "F6 opens it again" in window.notice._label.text()
     driver.go_on("ready", "stroking")
     assert not window.subject.isVisible()  # whoever closed it is not contradicted before an answer is due
     driver.phase("scoring")

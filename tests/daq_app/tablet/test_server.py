@@ -184,7 +184,7 @@ def test_a_new_code_lets_go_of_the_device_that_was_there(server):
         with pytest.raises(ConnectionClosed):
             first.recv(5.0)
     with socket(server, token=token) as again:  # nobody has typed anything
-        assert receive(again) == {"type": "refused", "sentence": "Another code holds now."}
+        assert receive(again) == {"type": "refused", "sentence": "Another code is now valid."}
     with socket(server, code=server.code) as second:
         assert receive(second)["type"] == "welcome"
 
@@ -207,7 +207,7 @@ def test_nonsense_ends_the_conversation_and_nothing_else(server, text):
 
 @pytest.mark.parametrize(
     ("address", "words"),
-    [("8.8.8.8", "private"), ("0.0.0.0", "private"), ("lab", "IPv4"), ("10.255.255.254", "no address of this machine")],
+    [("8.8.8.8", "private"), ("0.0.0.0", "private"), ("lab", "IPv4"), ("10.255.255.254", "address of this machine")],
 )
 def test_an_address_that_is_not_the_labs_own_is_refused_with_a_sentence(address, words):
     with pytest.raises(NoTabletServer, match=words):
@@ -220,7 +220,7 @@ def test_an_address_that_is_not_the_labs_own_is_refused_with_a_sentence(address,
         (["window", "--subject-screen", "tv"], 2, "invalid choice"),
         (["window", ".", "--subject-screen", "web"], 2, "leave out SESSION or --subject-screen"),
         (["--subject-address", "192.168.1.20"], 2, "give --subject-screen web too"),
-        (["--subject-screen", "web", "--subject-address", "8.8.8.8"], 1, "no address of a private network"),
+        (["--subject-screen", "web", "--subject-address", "8.8.8.8"], 1, "not an address of a private network"),
     ],
 )
 def test_what_the_command_line_asks_for_in_vain_is_one_sentence(arguments, code, words):

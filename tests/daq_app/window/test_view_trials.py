@@ -78,7 +78,7 @@ def test_a_flawed_stroke_says_redo_its_worst_flaw_and_what_to_do():
     [
         (SCORE, 2, "Its stroke is still to come."),
         ((*SCORE, log("skip", 1, reason="torn")), 1, "It was left out: no stroke of it counts."),
-        ((*SCORE, *TAKE_KEPT), 1, "Its stroke was recorded, and this window has not looked at it"),
+        ((*SCORE, *TAKE_KEPT), 1, "Its stroke was recorded, but this window has not examined it"),
     ],
 )
 def test_a_trial_without_a_stroke_says_why(messages, number, why):
