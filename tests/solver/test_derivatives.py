@@ -166,7 +166,7 @@ def test_at_a_kink_each_side_has_the_slope_of_its_own_states(small):
 def test_a_state_that_sticks_has_no_derivatives_of_its_own(small):
     contact = settled_state(SMALL["without a bound"], small)
     sticking_state = replace(contact, state=np.where(contact.state == SLIP, STICK, contact.state).astype(np.int32))
-    with pytest.raises(ValueError, match="depends on the way"):
+    with pytest.raises(ValueError, match="depends on its load path"):
         slide_derivatives(small, SMALL["without a bound"], sticking_state)
 
 
@@ -264,5 +264,5 @@ def determinant(f):
 def test_a_state_that_is_no_slide_has_no_derivatives_of_its_own(finite):
     slide = FINITE["without a bound"]
     state = slip(finite, slide)
-    with pytest.raises(ValueError, match="depends on the way"):
+    with pytest.raises(ValueError, match="depends on its load path"):
         slide_derivatives(finite, slide, replace(state, load=state.load._replace(sense=0)))
