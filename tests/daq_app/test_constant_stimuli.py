@@ -68,9 +68,9 @@ def test_without_forces_a_study_has_no_function_and_says_why(recording):
     visit = visit_of(recording, VisitOptions(), {})
     assert Counter(row.standard for row in visit.rows) == {50: 80, 55: 80}
     stimuli = constant_stimuli([(visit, row) for row in visit.rows if row.descriptor == "stickiness"])
-    assert "no friction was measured" in stimuli.functions["S03"].reason
+    assert "no comparison has a measured friction" in stimuli.functions["S03"].reason
     study = SimpleNamespace(descriptors=[SimpleNamespace(descriptor="stickiness", constant_stimuli=stimuli)])
-    assert "no friction was measured" in psychometric_sentences(study_functions(study)[0])[0]
+    assert "no comparison has a measured friction" in psychometric_sentences(study_functions(study)[0])[0]
     (row,) = psychometric_table(study_functions(study)).groups[0].rows
     assert [cell.text for cell in row[2:]] == ["–"] * 5
 
