@@ -221,7 +221,7 @@ def test_at_finite_strain_draws_lie_where_the_derivatives_carry_them(number):
     analysis, plan = shallow(ground_truth.visit(1), number)
     (row,) = drawn_with(LEVEL, predict(analysis, plan, FINITE)).trials
     interval, scene = row.interval, row.prediction.scene
-    draws = friction_draws(analysis.strokes[1], 1, "maximum", LEVEL)
+    draws = friction_draws(analysis.strokes[0], 0, "maximum", LEVEL)
     mu, tau_max = draws.mu[:60], draws.tau_max[:60]
     seds = np.array(seds_of([with_loads(scene, {"mu": m, "tau_max": t}) for m, t in zip(mu, tau_max, strict=True)]))
     linear = row.sed + interval.by_mu * (mu - row.mu) + interval.by_tau_max * (tau_max - row.tau_max)
@@ -257,6 +257,6 @@ def test_at_finite_strain_no_interval_is_told_where_draws_or_all_have_no_settled
     (row,) = with_intervals(near).trials
     assert row.interval.low is None
     assert "of 60 draws of the friction have no settled state" in row.interval.reason
-    largest = int(np.argmax(friction_draws(analysis.strokes[1], 1, "maximum").mu))
-    mu, tau_max, _ = (column[largest] for column in friction_draws(analysis.strokes[1], 1, "maximum"))
+    largest = int(np.argmax(friction_draws(analysis.strokes[0], 0, "maximum").mu))
+    mu, tau_max, _ = (column[largest] for column in friction_draws(analysis.strokes[0], 0, "maximum"))
     assert settled_predictions([with_loads(row.prediction.scene, {"mu": mu, "tau_max": tau_max})]) == (None,)
