@@ -76,8 +76,9 @@ def analyse_session(
 
 
 def stored_settings(recording: Recording) -> AnalysisSettings:
-    """Return the settings last chosen for a session. Raises RecordingError if the gain's error is damaged."""
-    return replace(settings_of(_read_or_empty(recording, ANALYSIS)), gain_error=gain_error_set(recording.folder))
+    """Return the settings last chosen for a session. Raises RecordingError if a file that holds them is damaged."""
+    document = stored_document(recording.folder, ANALYSIS) or {}
+    return replace(settings_of(document), gain_error=gain_error_set(recording.folder))
 
 
 def outdated_prediction(recording: Recording, now: AnalysisSettings) -> str | None:

@@ -8,6 +8,7 @@ import pytest
 from json_answer import answer
 from report_session import record
 
+from daq_app.analyst.work import Work
 from daq_app.cli.main import run
 from sessions.recording import RecordingError
 from sessions.recording.archive import seal
@@ -37,6 +38,16 @@ def test_a_damaged_analysis_is_made_anew_and_the_loss_of_what_was_set_in_it_is_n
     assert "the law of the contact area and seed of the intervals are now the default ones" in error
     assert json.loads((small / "analysis.json").read_bytes())["settings"]["area"]["law"] == "fixed"
     assert run([verb, str(small)]) == 0
+
+
+def test_the_window_and_a_fit_name_a_damaged_analysis_and_do_not_take_default_settings(small, tmp_path, capsys):
+    (small / "analysis.json").write_text("{")
+    log = tmp_path / "stage.csv"
+    log.write_text("time_s,displacement_mm\n0,0\n1,1\n")
+    assert run(["fit-finger", str(small), "--displacement", str(log)]) == 1
+    assert "analysis.json is damaged" in capsys.readouterr().err
+    with pytest.raises(RecordingError, match="'daq-app analyse' computes it again"):
+        Work(small, lambda _: None)
 
 
 def test_a_damaged_prediction_is_made_anew_and_the_loss_of_what_was_set_in_it_is_named(small, capsys):
