@@ -15,9 +15,7 @@ from solver.equilibrium.load_stepping import march
 from solver.mesh import block
 
 LENGTH, THICKNESS = 10.0, 1.0
-STRAIN = (
-    pi**2 / 12.0 * (THICKNESS / LENGTH) ** 2
-)  # Euler's, of a column whose ends keep their direction, one free to move
+STRAIN = pi**2 / 12.0 * (THICKNESS / LENGTH) ** 2  # Euler's: the ends keep their direction, one is free to move
 
 
 @pytest.mark.parametrize(("part", "stable"), [(0.5, True), (0.93, True), (1.05, False)])
