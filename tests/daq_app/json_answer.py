@@ -1,4 +1,4 @@
-"""What a verb told to answer in JSON printed, for tests."""
+"""The JSON answer that a verb printed, for tests."""
 
 import json
 

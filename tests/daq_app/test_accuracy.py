@@ -1,4 +1,4 @@
-"""The accuracy page: what is measured is told as it is, whatever was met, missed, left out or stopped."""
+"""The accuracy page: it shows every measurement, whether a target was met, missed, left out or stopped."""
 
 import json
 import math

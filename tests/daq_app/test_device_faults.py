@@ -1,4 +1,4 @@
-"""What a session says of readings that came while the device told of a fault, or counted otherwise: on a real run."""
+"""What a session says of readings during a fault of the device or a jump of its counter, on a real run."""
 
 import json
 import os

@@ -54,7 +54,7 @@ def test_the_rate_is_of_the_last_second_of_the_session_s_clock(monkeypatch, fact
         watched.display.take(readings(0, 10 if step < 15 else 25))
         watched.display.look(Health())
     rates = [report.rate for report in watched.of(HealthReport)]
-    assert rates[:2] == [0.0, 0.0]  # of a fifth of a second nothing is told
+    assert rates[:2] == [0.0, 0.0]  # readings of 0.2 s give no rate yet
     assert rates[12] == pytest.approx(100.0 / factor)
     assert rates[30] == pytest.approx(250.0 / factor)
 

@@ -6,25 +6,10 @@ from unittest.mock import Mock
 
 import pytest
 from json_answer import answer
-from report_session import record
 
 from daq_app.analyst.work import Work
 from daq_app.cli.main import run
 from sessions.recording import RecordingError
-from sessions.recording.archive import seal
-
-
-@pytest.fixture(scope="module")
-def two_trials(tmp_path_factory):
-    """A sealed session of two trials; tests that change it take a copy."""
-    folder, _ = record(tmp_path_factory.mktemp("two") / "P01", per_block=1)
-    seal(folder)
-    return folder
-
-
-@pytest.fixture
-def small(two_trials, tmp_path):
-    return shutil.copytree(two_trials, tmp_path / "P01")
 
 
 @pytest.mark.parametrize("verb", ["analyse", "predict"])

@@ -18,14 +18,12 @@ import pytest
 from examples import SCENE
 from json_answer import answer
 from page_numbers import estimates
-from report_session import record
 
 from daq_app.batch.derived import stored_document
 from daq_app.batch.pool import Shelf, content_of
 from daq_app.cli.main import run
 from sessions.prediction import PredictionOptions, finger_in
 from sessions.recording import Recording
-from sessions.recording.archive import seal
 from sessions.recording.derived import gain_error_set
 from sessions.report import findings
 from sessions.statistics.visit import VisitOptions, visit_of
@@ -34,19 +32,6 @@ from sessions.strokes.analysis import bootstrap_settings, check_analysis
 from sessions.toml_file import SettingsError
 
 ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture(scope="module")
-def two_trials(tmp_path_factory):
-    """A sealed session of two trials; tests that change it take a copy."""
-    folder, _ = record(tmp_path_factory.mktemp("two") / "P01", per_block=1)
-    seal(folder)
-    return folder
-
-
-@pytest.fixture
-def small(two_trials, tmp_path):
-    return shutil.copytree(two_trials, tmp_path / "P01")
 
 
 @pytest.fixture(scope="module")

@@ -59,7 +59,7 @@ def fields_of(message):
 
 
 def client(folder, pipe, *, pausing):
-    """Be the client: begin or resume the session, answer a little later, and report down `pipe` all that is told."""
+    """Be the client: begin or resume the session, answer a little later, and report every message down `pipe`."""
 
     def report(**fields):
         os.write(pipe, (json.dumps(fields) + "\n").encode())
@@ -98,7 +98,7 @@ class Killing:
         self.events, self.safe, self.newest_by_stream, self.recorder = [], 0, {}, None
         self.reached = False
         self.states = set()
-        self.lost = 0.0  # told seconds of readings that were shown and are not in the file
+        self.lost = 0.0  # simulated seconds of readings that were shown and are not in the file
         self._chance = chance
         if state == "idle":
             shutil.rmtree(folder, ignore_errors=True)  # no session comes back to it
@@ -120,13 +120,13 @@ class Killing:
             self._watch(pipe)
 
     def _watch(self, pipe):
-        """Follow what the client is told; kill a random while after the state is reached."""
+        """Follow the client's messages; kill a random while after the state is reached."""
         self._until_due(pipe)
         if self.victim in ("recorder", "both") and self.recorder is not None:
             self._kill(self.recorder)
         if self.victim in ("client", "both"):
             os.kill(self._process, signal.SIGKILL)
-        # What was on its way when it was killed counts as told.
+        # A message that was on its way at the kill counts as received.
         end = time.monotonic() + (0.3 if self.victim == "recorder" else 0.05)
         while time.monotonic() < end and self._took(pipe):
             pass

@@ -55,7 +55,7 @@ def start(transducer: Transducer) -> None:
 
 
 def follow_readings(transducer: Transducer, clock: Clock, until: float, begun_ns: int) -> Run:
-    """Read until so many told seconds have passed; every number is received or lost, times never run back."""
+    """Read until so many simulated seconds have passed; every number is received or lost, times never run back."""
     run, last, time_ = Run(), 0, 0.0
     start(transducer)
     count = 0
@@ -102,7 +102,7 @@ def follow_all(clock: Clock, faults: Callable[[Simulator], Faults], folder: Path
                         raise error
             runs[name] = follow_readings(transducer, clock, until, begun_ns)
             transducer.close()
-        except BaseException as error:  # noqa: BLE001 - told by the test
+        except BaseException as error:  # noqa: BLE001 - the test reports it
             runs[name] = Run(error=f"{type(error).__name__}: {error}")
 
     threads = [threading.Thread(target=follow, args=(name, device.uri)) for name, device in devices.items()]

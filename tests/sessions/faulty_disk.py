@@ -56,7 +56,7 @@ class Layer(ctypes.Structure):
 
 
 class FaultyDisk:
-    """What the layer counts and when it fails; `fail` is told ("write" or "sync", its number) and returns a code."""
+    """What the layer counts and when it fails; `fail` takes ("write" or "sync", its number) and returns a code."""
 
     def __init__(self, fail):
         self.fail = fail

@@ -1,4 +1,4 @@
-"""Stand-ins for the runner's world: a clock that is told the time, a transducer, an experimenter with a subject."""
+"""Stand-ins for the runner's world: a clock that the test sets, a transducer, an experimenter with a subject."""
 
 import numpy as np
 
@@ -24,7 +24,7 @@ class ResumableClock(SimulatedClock):
 
 
 class StandIn:
-    """A transducer at 200 Hz on a told clock, pressed where `touches` say: (from, to, newtons), session clock [ns]."""
+    """A transducer at 200 Hz on the clock of the test. `touches` press it: (from, to, newtons), session clock [ns]."""
 
     def __init__(self, clock, *, seed=0, lost=(), link_lost_after=None, rate_words=""):
         self.clock = clock

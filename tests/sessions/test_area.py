@@ -1,4 +1,4 @@
-"""The contact area by which tau_max is told: fixed, or growing with the normal force by a stated law."""
+"""The contact area behind tau_max: fixed, or growing with the normal force by a stated law."""
 
 from dataclasses import replace
 

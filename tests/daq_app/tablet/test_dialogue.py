@@ -1,4 +1,4 @@
-"""What becomes of an answer on the tablet: told once, acknowledged when safe, never lost, never taken for another."""
+"""What becomes of an answer on the tablet: sent once, acknowledged when safe, never lost, never taken for another."""
 
 import json
 
@@ -51,7 +51,7 @@ def test_an_answer_goes_to_the_recorder_once_and_is_acknowledged_when_it_is_safe
     assert not [message for message in tablet.messages if isinstance(message, Stored)]
     tablet.show(*SCORE, log("scored", 1, score=60.0))
     assert tablet.messages.count(Stored(key)) == 1
-    assert tablet.give(key) is None  # its acknowledgement got lost: it is told again
+    assert tablet.give(key) is None  # its acknowledgement got lost: it is sent again
     assert tablet.messages.count(Stored(key)) == 2
 
 

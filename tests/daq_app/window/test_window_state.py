@@ -156,7 +156,7 @@ def test_the_recording_lamp_is_fed_by_what_the_disk_acknowledged_and_by_nothing_
     assert derive_view(state).lamp.grade == "off"
     state = after(status(1_000), state=state)
     assert derive_view(state).lamp.grade == "on"
-    for second in range(1, 6):  # the state goes on being told, but nothing more becomes safe
+    for second in range(1, 6):  # the state is still reported, but nothing more becomes safe
         state = after(Tick(100.0 + second), status(1_000), state=state)
     lamp = derive_view(state).lamp
     assert lamp.grade == "wrong"
