@@ -168,7 +168,7 @@ def test_pictures_and_tables_can_be_made_again_from_the_data_alone(example, path
     assert tables(again) == tables(example)
 
 
-def test_a_number_that_is_none_comes_back_from_the_data_and_is_told_as_missed(example):
+def test_a_number_that_is_none_comes_back_from_the_data_and_is_reported_as_missed(example):
     row = Problem("Cattaneo", "", "half stick c/a", 0.1, math.nan, math.nan, 0.02, 0.1)  # no node sticks
     again = restore(replace(example, rows={"problems": (row,)}).to_dict())
     assert tables(again)["problems"].rows[0][-1] == "MISSED"
@@ -225,7 +225,7 @@ def test_a_speed_is_that_of_the_cheapest_mesh_that_meets_the_error_with_its_rati
     assert verdict(example, "small strain, all ten surfaces, from scratch").verdict == "missed"  # 24 ms
 
 
-def test_an_error_that_no_mesh_met_is_missed_and_the_best_is_told(example):
+def test_an_error_that_no_mesh_met_is_missed_and_the_best_is_reported(example):
     row = verdict(example, "finite strain, one surface", "0.06 %")
     assert row.measured is None
     assert row.verdict == "missed"

@@ -317,7 +317,7 @@ def test_a_compared_session_comes_with_the_fingers_of_its_answers(at_work):
         np.testing.assert_allclose(finger.row, list(predictions[key].row.values()))
 
 
-def test_a_file_that_cannot_be_written_is_told_with_its_name_and_what_to_do(at_work, tmp_path):
+def test_a_file_that_cannot_be_written_is_reported_with_its_name_and_what_to_do(at_work, tmp_path):
     work, _ = at_work
     with pytest.raises(FileNotFoundError) as refusal:
         work.do(m.Write("picture course", str(tmp_path / "nowhere" / "course.png")))
@@ -330,7 +330,7 @@ def test_what_is_said_of_one_trial_does_not_stay_with_the_next(state):
     assert fold(told_state, m.Choose(state.row + 1)).outcome == ""
 
 
-def test_the_readings_shown_are_those_of_the_file_and_their_rows_are_told(at_work):
+def test_the_readings_shown_are_those_of_the_file_and_their_rows_are_reported(at_work):
     work, states = at_work
     work.do(m.ShowReadings(1))
     readings = states[-1].excerpt.readings
@@ -370,7 +370,7 @@ def wait(analyst, kind):
     return messages
 
 
-def test_a_folder_that_is_no_session_is_told_in_a_sentence(tmp_path):
+def test_a_folder_that_is_no_session_is_reported_in_a_sentence(tmp_path):
     analyst = Analyst(tmp_path)
     try:
         assert str(tmp_path) in wait(analyst, m.Problem)[-1].sentence

@@ -51,7 +51,7 @@ def test_a_terminal_is_shown_control_characters_and_does_not_obey_them(capsys):
     assert "\x1b" not in capsys.readouterr().err
 
 
-def test_a_full_disk_is_told_with_what_could_not_be_written_and_where():
+def test_a_full_disk_is_reported_with_what_could_not_be_written_and_where():
     class Full(io.StringIO):
         def write(self, _):
             raise OSError(errno.ENOSPC, "No space left on device")

@@ -123,7 +123,7 @@ def test_the_load_is_that_of_what_the_transducer_feels_its_zero_included():
     assert report.load[:3] == report.peak[:3] == pytest.approx((4.5 / 36, 0.0, 0.5))
 
 
-def test_the_time_since_the_newest_reading_is_told_and_where_none_need_come_it_is_nothing(monkeypatch):
+def test_the_time_since_the_newest_reading_is_reported_and_where_none_need_come_it_is_nothing(monkeypatch):
     now, reports = [100.0], []
     monkeypatch.setattr("daq_app.recorder.display.time.monotonic", lambda: now[0])
     display, ones = Display(reports.append, 1.0), np.zeros(1, np.int64)

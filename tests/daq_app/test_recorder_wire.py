@@ -105,7 +105,7 @@ def test_an_array_of_objects_is_refused():
         Codec([Live]).decode(body)
 
 
-def test_a_report_that_cannot_be_told_does_not_keep_the_others_back():
+def test_a_report_that_cannot_be_sent_does_not_keep_the_others_back():
     reading, writing = os.pipe()
     outbox = Outbox(writing)
     outbox.send(LoggedEvent(1, 0, "made up", None, 0, {"value": object()}))

@@ -106,7 +106,7 @@ def test_a_file_that_holds_something_else_than_answers_is_left_as_it_is(tmp_path
         assert (tmp_path / "other").read_bytes() == content
 
 
-def test_answers_that_cannot_be_kept_where_somebody_says_are_told_with_what_mends_it(tmp_path, capsys):
+def test_answers_that_cannot_be_kept_where_somebody_says_are_reported_with_what_mends_it(tmp_path, capsys):
     assert run(["sensitivity", "--samples", "2", "--keep", str(tmp_path / "none" / "answers")]) == 1
     assert "cannot be used (No such file or directory); check its name" in capsys.readouterr().err
 

@@ -111,7 +111,7 @@ def test_a_line_that_means_nothing_is_told_what_is_asked_for(line):
     assert text.count(f"Score from 0 ({ENDS[0]}) to 100 ({ENDS[1]}):") == 2  # as asked, and once more
 
 
-def test_a_pause_is_told_once_with_how_it_ends_and_enter_does_nothing_meanwhile():
+def test_a_pause_is_reported_once_with_how_it_ends_and_enter_does_nothing_meanwhile():
     out = io.StringIO()
     terminal = Terminal(Console(as_json=False, err=out), forces=False, lines=io.StringIO("\n"))
     while not terminal.closed:

@@ -132,7 +132,7 @@ def test_it_feels_what_the_bench_exerts(calm_course, name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_its_lag_is_told(calm_course, name):
+def test_its_lag_is_reported(calm_course, name):
     course = calm_course(name)
     assert all(0.0 <= health.lag_ms < 1e4 for health in course.healths)
 

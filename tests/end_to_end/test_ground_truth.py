@@ -121,7 +121,7 @@ def test_the_steady_window_lies_in_the_slide(rows):
     assert all(truth.slip <= stroke.steady[0] and stroke.steady[1] <= truth.end for stroke, _, truth in rows)
 
 
-def test_break_away_is_within_five_milliseconds_of_the_slip_and_told_only_where_the_finger_was_held(rows):
+def test_break_away_is_within_five_milliseconds_of_the_slip_and_reported_only_where_the_finger_was_held(rows):
     ends = [(stroke.break_away, truth.slip) for stroke, _, truth in rows if truth.surface.holds]
     assert max(abs(estimate - true) for estimate, true in ends) < 0.005
     assert all(stroke.break_away is None for stroke, _, truth in rows if not truth.surface.holds)

@@ -263,7 +263,7 @@ def test_a_cluster_without_workers_is_given_up_in_a_sentence(study, tmp_path, mo
 
 @pytest.mark.slow
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:{silent}", "tcp://127.0.0.1:9", "http://127.0.0.1:{silent}"])
-def test_an_address_where_no_scheduler_answers_is_told_in_a_sentence(study, tmp_path, monkeypatch, capsys, address):
+def test_an_address_where_no_scheduler_answers_is_reported_in_a_sentence(study, tmp_path, monkeypatch, capsys, address):
     monkeypatch.setattr(pooling, "_ANSWERS", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as silent:
         uri = address.format(silent=silent.getsockname()[1])

@@ -122,7 +122,7 @@ def test_the_same_seed_gives_the_same_spikes_and_each_trial_its_own():
     assert once[0].spikes.tolist() != once[1].spikes.tolist()
 
 
-def test_every_parameter_is_told_with_its_standing():
+def test_every_parameter_is_reported_with_its_standing():
     assert {*PARAMETERS, "quantity"} == {field.name for field in fields(AfferentSettings)}
     assert {parameter["standing"] for parameter in parameters(USUAL) if parameter["name"] != "seed"} == {"assumed"}
 
@@ -137,7 +137,7 @@ def test_the_usual_threshold_is_the_sed_of_one_per_cent_strain_in_the_dermis():
     assert pytest.approx(0.5 * 0.08 * 0.01**2) == USUAL.threshold
 
 
-def test_a_parameter_that_somebody_set_is_told_as_set_and_the_reference_as_assumed():
+def test_a_parameter_that_somebody_set_is_reported_as_set_and_the_reference_as_assumed():
     by_name = {parameter["name"]: parameter for parameter in parameters(settings_with({"static_gain": 30.0}), 0.0086)}
     assert (by_name["static_gain"]["value"], by_name["static_gain"]["standing"]) == (30.0, "set")
     assert (by_name["reference"]["value"], by_name["reference"]["standing"]) == (0.0086, "assumed")

@@ -70,11 +70,11 @@ def test_everybody_who_decides_at_once_gets_a_line_and_a_number_of_its_own(recor
         ("direction", 1, -1, "direction of stroke 1 of trial 1 is -1 (it was 1): why"),
     ],
 )
-def test_what_was_decided_is_told_with_its_unit(what, old, new, words):
+def test_what_was_decided_is_reported_with_its_unit(what, old, new, words):
     assert Decision("E02", "why", what, 1, 1, old, new, number=1).sentence == f"decision 1 by E02: {words}"
 
 
-def test_the_tilt_decided_is_told_in_degrees():
+def test_the_tilt_decided_is_reported_in_degrees():
     tilt = Decision("E02", "why", "tilt", old=(0.0, 0.0), new=(1.0, -0.5), number=1)
     words = "tilt of the recording is 1 and -0.5 degrees (it was 0 and 0 degrees)"
     assert tilt.sentence == f"decision 1 by E02: {words}: why"

@@ -26,7 +26,7 @@ def no_large_file():
 
 @pytest.mark.usefixtures("no_large_file")
 @pytest.mark.parametrize("form", [pytest.param(form, marks=[pytest.mark.slow] * (form == "nwb")) for form in FORMATS])
-def test_a_disk_that_takes_no_more_leaves_nothing_of_an_export_and_is_told_in_a_sentence(source, tmp_path, form):
+def test_a_disk_that_takes_no_more_leaves_nothing_of_an_export_and_is_reported_in_a_sentence(source, tmp_path, form):
     with pytest.raises(ExportError, match=r"cannot be written \(File too large"):
         export(source, form, tmp_path / "out")
     gc.collect()  # a file that HDF5 could not close would bring the process down by now

@@ -247,14 +247,14 @@ def test_a_pause_before_the_score_keeps_the_stroke_and_asks_again():
     assert [type(command) for command in commands] == [AskScore]
 
 
-def test_a_further_stroke_before_the_score_is_told_and_the_take_stays():
+def test_a_further_stroke_before_the_score_is_reported_and_the_take_stays():
     commands = commands_after(FORCES, Begin(), mount(), Zeroed(), *STROKE, ContactOnset())
     assert [type(command) for command in commands] == [Tell]
     commands = commands_after(FORCES, Begin(), mount(), Zeroed(), *STROKE, *STROKE, Scored(1.0), Settled())
     assert commands[0] == KeepTake(1, 1)
 
 
-def test_strokes_that_are_allowed_are_taken_in_silence_and_the_next_is_told():
+def test_strokes_that_are_allowed_are_taken_in_silence_and_the_next_is_reported():
     plan = plan_of(["line"], strokes_allowed=2)
     so_far = (Begin(), put_on(plan, 1), Zeroed())
     assert commands_after(plan, *so_far) == (AskStroke(plan.trials[0], 2),)

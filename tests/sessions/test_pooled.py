@@ -67,7 +67,7 @@ def test_the_true_relation_of_people_at_large_stands_beside_the_intervals_for_th
 
 
 @pytest.mark.usefixtures("words_alone")
-def test_a_decision_leaves_a_subject_out_of_every_number_and_is_told():
+def test_a_decision_leaves_a_subject_out_of_every_number_and_is_reported():
     out = (Exclusion("S03", "asked to", "the experimenter"),)
     findings, without = pool_visits(VISITS, exclusions=out), pool_visits([v for v in VISITS if v.subject != "S03"])
     assert findings.descriptors == without.descriptors
@@ -221,7 +221,7 @@ def test_a_simulated_flaw_that_nobody_names_is_not_detected():
     assert [flaw.detected for flaw in flaws] == [True, False, True, True]
 
 
-def test_what_was_excluded_is_told_with_who_and_why_and_trials_alike_together():
+def test_what_was_excluded_is_reported_with_who_and_why_and_trials_alike_together():
     study_findings = study()
     sentences = " ".join(exclusion_sentences(study_findings))
     assert "Subject S03: every trial left out by E02: used the scale backwards" in sentences

@@ -44,7 +44,7 @@ def prediction(progress_calls):
     return progress_calls[0]
 
 
-def test_the_trial_that_is_wanted_first_is_told_first_and_each_as_it_stays(progress_calls):
+def test_the_trial_that_is_wanted_first_is_reported_first_and_each_as_it_stays(progress_calls):
     prediction, calls = progress_calls
     assert [number for number, _, _ in calls] == [6, 0, 1, 2, 3, 4, 5, 7, 8, 9]
     for number, row, _ in calls:

@@ -73,7 +73,7 @@ JSON = st.recursive(
     )
 )
 @settings(max_examples=25, deadline=None)
-def test_events_come_back_as_they_were_told(events):
+def test_events_come_back_as_they_were_reported(events):
     with tempfile.TemporaryDirectory() as room:
         folder = Path(room) / "s"
         writer = new_writer(folder)
@@ -271,7 +271,7 @@ def test_a_closed_recording_takes_no_more_and_closing_again_does_no_harm(tmp_pat
         writer.event("late")
 
 
-def test_a_failing_write_is_told_with_what_is_safe_and_nothing_safe_is_lost(tmp_path):
+def test_a_failing_write_is_reported_with_what_is_safe_and_nothing_safe_is_lost(tmp_path):
     writer = new_writer(tmp_path / "s")
     writer.readings(readings(0, 10))
     writer.event("started")

@@ -191,13 +191,13 @@ def test_a_session_in_which_people_do_anything_at_any_moment_comes_out_identical
     replay_identical(recording, tmp_path)
 
 
-def test_lost_readings_are_told_of_at_the_same_moments(tmp_path):
+def test_lost_readings_are_reported_at_the_same_moments(tmp_path):
     recording = record_session(tmp_path / "session", lost=range(100, 1500, 7))
     assert sum(event.kind == "losses" for event in recording.events) > 3
     replay_identical(recording, tmp_path)
 
 
-def test_a_zero_that_could_not_be_measured_is_told_of_at_the_same_moments(tmp_path):
+def test_a_zero_that_could_not_be_measured_is_reported_at_the_same_moments(tmp_path):
     class LeaningHands(Hands):
         def show(self, command):
             if isinstance(command, AskMount) and not self.transducer.touches:

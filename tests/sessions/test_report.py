@@ -310,7 +310,7 @@ def test_one_stroke_without_friction_is_one_stroke_and_several_are_strokes(tmp_p
     assert any(sentence.startswith("No dynamic friction is given for strokes 1, 2:") for sentence in excluded)
 
 
-def test_what_became_of_each_trial_that_does_not_count_is_told():
+def test_what_became_of_each_trial_that_does_not_count_is_reported():
     line, choice = TRIAL, replace(TRIAL, answer="choice")
     trials = tuple(replace(trial, number=n) for n, trial in enumerate((line, line, choice, line, line), 1))
     plan = replace(PLAN, blocks=(replace(PLAN.blocks[0], trials=trials),))
@@ -337,7 +337,7 @@ def test_what_became_of_each_trial_that_does_not_count_is_told():
     )
 
 
-def test_who_took_part_and_what_of_the_finger_was_measured_is_told():
+def test_who_took_part_and_what_of_the_finger_was_measured_is_reported():
     finger = replace(PLAN.finger, tip_radius=6.5, width=None)
     plan = replace(PLAN, finger=finger, contact_angle=30.0, contact_angle_origin="measured", masking="pink noise")
     tables = [SimpleNamespace(subject=subject, scores=scores) for subject, scores in (("S02", (1,)), ("S01", (2,)))]

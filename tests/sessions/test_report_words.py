@@ -76,7 +76,7 @@ def test_trials_without_a_number_in_a_variant_are_no_points_of_its_correlation(r
     )
 
 
-def test_how_far_the_ending_may_be_moved_with_the_same_sign_is_told(report):
+def test_how_far_the_ending_may_be_moved_with_the_same_sign_is_reported(report):
     signs = {-0.5: -1.0, -0.25: 1.0, 0.0: 1.0, 0.25: 1.0, 0.5: 1.0, 0.75: -1.0, 1.0: 1.0, 9.0: 1.0}
     rows = tuple(
         replace(p, row={arc: sign * p.sed for arc, sign in signs.items()}) for p in report.predictions

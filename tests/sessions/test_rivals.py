@@ -163,7 +163,7 @@ def people(draw, judge, subjects=10):
     return trials
 
 
-def test_the_quantity_that_people_judge_by_is_told_from_its_rivals():
+def test_the_quantity_that_people_judge_by_is_distinguished_from_its_rivals():
     draw = np.random.default_rng(7)
     by_mu = {rival.name: rival for rival in rivals_within(people(draw, lambda mu, _: 120.0 * (mu - 0.5)))}
     by_sed = {rival.name: rival for rival in rivals_within(people(draw, lambda _, sed: 4e4 * (sed - 0.0086)))}

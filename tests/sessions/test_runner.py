@@ -257,7 +257,7 @@ def test_a_further_stroke_before_the_score_is_recorded_and_flagged(tmp_path):
     assert recording.flaws == ("trial 1 holds 2 strokes where one was asked for",)
 
 
-def test_no_zero_is_taken_while_something_touches_and_somebody_is_told(tmp_path):
+def test_no_zero_is_taken_while_something_touches_and_somebody_is_informed(tmp_path):
     session = Session(tmp_path / "s")
 
     def lean(_):

@@ -117,7 +117,7 @@ PSE = logs(1.25, 1.1, 1.5)
         (logs(1.18, None, 1.27), "bounded on neither side"),
     ],
 )
-def test_equal_and_just_noticeable_friction_of_one_subject_are_told_in_ratios_of_mu(jnd, words):
+def test_equal_and_just_noticeable_friction_of_one_subject_are_reported_in_ratios_of_mu(jnd, words):
     function = Psychometric(40, PSE, jnd, IntervalEstimate(0.04, None, None), rises=False)
     equal, falling = psychometric_sentences(("friction", {"S1": function}, (None, None)))
     assert equal == (

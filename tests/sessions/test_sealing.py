@@ -68,7 +68,7 @@ def test_a_seal_made_after_the_key_was_opened_does_not_pass_for_an_earlier_one(s
     assert "the record of unblinding does not hold this seal" in sentence_of(session)
 
 
-def test_other_numbers_than_the_sealed_ones_are_told(session):
+def test_other_numbers_than_the_sealed_ones_are_reported(session):
     seal_prediction(Recording.open(session), PREDICTION)
     assert "shown are those" in sentence_of(session, sed=0.0085 * (1 + 1e-15))
     assert "were made later and differ" in sentence_of(session, sed=0.0086)
@@ -90,7 +90,7 @@ def test_without_blinding_a_seal_says_that_nothing_hid_the_scores(session):
     assert "when nothing hid which score" in sentence_of(session)
 
 
-def test_a_damaged_seal_is_told_and_stops_no_report(session):
+def test_a_damaged_seal_is_reported_and_stops_no_report(session):
     seal_prediction(Recording.open(session), PREDICTION)
     whole = (session / SEAL).read_bytes()
     for damaged in (whole[:-20], whole.replace(b'"numbers"', b'"numberz"')):

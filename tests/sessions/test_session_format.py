@@ -42,7 +42,7 @@ def session_folder(tmp_path_factory):
 
 
 @pytest.mark.parametrize("table", ["head", "blocks", "events"])
-def test_every_column_of_the_live_file_is_told(session_folder, table):
+def test_every_column_of_the_live_file_is_documented(session_folder, table):
     assert f"## Table `{table}`" in PAGE
     columns = {name for _, name, *_ in rows(session_folder, f"PRAGMA table_info({table})")}
     assert columns <= NAMES
@@ -56,7 +56,7 @@ def test_the_live_file_has_no_other_table(session_folder):
     }
 
 
-def test_every_data_set_of_the_copy_is_told(session_folder):
+def test_every_data_set_of_the_copy_is_documented(session_folder):
     data_sets = []
     with h5py.File(session_folder / "session.h5") as copy:
         copy.visititems(lambda name, item: data_sets.append(name) if isinstance(item, h5py.Dataset) else None)
@@ -64,13 +64,13 @@ def test_every_data_set_of_the_copy_is_told(session_folder):
     assert set(data_sets) <= NAMES
 
 
-def test_every_kind_of_event_is_told(session_folder):
+def test_every_kind_of_event_is_documented(session_folder):
     kinds = {kind for (kind,) in rows(session_folder, "SELECT kind FROM events")}
     possible = {event_log.kind_of(kind) for kind in get_args(Event)}
     assert kinds | possible | set(COUNTS) <= NAMES
 
 
-def test_every_key_of_a_protocol_is_told():
+def test_every_key_of_a_protocol_is_documented():
     page = (DOCS / "how-to" / "add-a-protocol.md").read_text(encoding="utf-8")
     tables = {
         "": Protocol,

@@ -39,7 +39,7 @@ def pick(row, reading, driven, kinematics="small"):
     return next(a for a in row.alternatives if a.variant == Variant(kinematics, reading, driven))
 
 
-def test_every_trial_is_told_along_the_same_named_ways(variants):
+def test_every_trial_is_reported_along_the_same_named_ways(variants):
     for row in variants.trials:
         assert [(a.variant.tau_reading, a.variant.driven) for a in row.alternatives] == SMALL
         assert all(a.sed > 0 and a.error_estimate < 0.01 and a.reason == "" for a in row.alternatives)

@@ -71,7 +71,7 @@ def test_a_flat_top_is_named_as_saturation_and_no_peak_of_it_is_given(axis, low,
         assert stroke.mu_dynamic is None or stroke.mu_dynamic == pytest.approx(MU, rel=0.01)
 
 
-def test_a_stroke_whose_middle_is_clipped_is_not_told_as_two_taps():
+def test_a_stroke_whose_middle_is_clipped_is_not_reported_as_two_taps():
     t = times(5.0)
     rise, lift = (np.clip(way / 0.12, 0.0, 1.0) for way in (t - 1.0, 3.5 - t))
     press = 2.0 * (rise**2 * (3.0 - 2.0 * rise)) * (lift**2 * (3.0 - 2.0 * lift)) * (1.0 + 0.05 * np.sin(19.5 * t))

@@ -26,7 +26,7 @@ def test_a_finger_that_rests_before_it_is_moved_breaks_away_no_earlier(rest):
     assert stroke.break_away == pytest.approx(slip, abs=0.005)
 
 
-def test_a_rest_of_three_readings_is_told_from_the_climb():
+def test_a_rest_of_three_readings_is_distinguished_from_the_climb():
     time = np.arange(300) / 200.0
     readings = ClimbReadings(time, 0.05 + 0.5 * np.clip((time - 0.012) / 0.5, 0.0, 1.0), ClimbSettings())
     climb = readings.fit(0.1, peaked=False)
@@ -58,7 +58,7 @@ def test_a_static_peak_is_where_the_finger_breaks_away_but_for_what_the_filter_r
     assert stroke.break_away == pytest.approx(1.4, abs=0.02)
 
 
-def test_no_break_away_is_told_after_the_slide_began():
+def test_no_break_away_is_reported_after_the_slide_began():
     stroke = climbing(0.5 * np.clip((T - 1.0) / 1.0, 0.0, 1.0), 1.4)
     assert stroke.slide_onset == pytest.approx(1.4, abs=0.05)
     assert stroke.break_away is None

@@ -87,7 +87,7 @@ def test_levelling_takes_the_error_of_the_lean_out_of_friction():
     assert level.speed == pytest.approx(25.0, rel=0.01)
 
 
-def test_a_lean_that_was_levelled_is_still_told_as_that_of_the_face():
+def test_a_lean_that_was_levelled_is_still_reported_as_that_of_the_face():
     tilt = analyse(block(T, noisy(lean_wrench(presses()))), settings=replace(SETTINGS, tilt=LEAN)).tilt
     assert tilt.lean == pytest.approx(LEAN, abs=0.05)
 

@@ -246,7 +246,7 @@ def test_intervals_of_200_visits_hold_the_sed_of_the_true_friction(kinematics):
 
 
 @pytest.mark.slow
-def test_at_finite_strain_no_interval_is_told_where_draws_or_all_have_no_settled_slide():
+def test_at_finite_strain_no_interval_is_reported_where_draws_or_all_have_no_settled_slide():
     analysis, plan = shallow(ground_truth.visit(1), 2)
     beyond = predict(analysis, plan, replace(FINITE, indentation=2.0))
     (row,) = with_intervals(beyond).trials

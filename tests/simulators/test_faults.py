@@ -90,7 +90,7 @@ def test_the_same_happens_however_many_datagrams_are_sent_at_one_go(kind):
     assert leaving == datagrams_after_faults(*timetable)
 
 
-def test_faults_of_the_box_itself_are_told_by_time():
+def test_faults_of_the_box_itself_are_reported_by_time():
     faults = Faults([Fault("stall", 1.0, 2.0)])
     assert [faults.active("stall", t) for t in (0.5, 1.0, 1.9, 2.0)] == [False, True, True, False]
     assert not faults.active("reboot", 1.5)

@@ -224,7 +224,7 @@ def test_an_oscillator_that_is_wrong_counts_more_ticks_in_the_same_time():
     assert fast.time(50 + 7000) == pytest.approx(1.0 / 1.005, abs=1e-9)
 
 
-def test_saturation_is_told_in_the_status_and_clips_at_the_rated_range(start_box):
+def test_saturation_is_reported_in_the_status_and_clips_at_the_rated_range(start_box):
     settings = BenchSettings(noise_force=0, noise_torque=0, drift_force=0, drift_torque=0, offset=(0, 0, -40, 0, 0, 0))
     with client(start_box(settings)) as udp:
         udp.send(START)

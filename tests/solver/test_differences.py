@@ -110,7 +110,7 @@ def test_surfaces_that_nobody_asked_to_tell_apart_say_in_what_and_by_how_much_th
 
 
 @pytest.mark.slow
-def test_courses_of_surfaces_that_hardly_differ_are_marched_and_told_once_on_a_mesh_that_tells_them_apart():
+def test_courses_of_surfaces_that_hardly_differ_are_marched_and_reported_once_on_a_mesh_that_tells_them_apart():
     surfaces, truth = surfaces_alike("small", None, "history", 0.05)
     numbers = []
     predictions = solve_many(surfaces, watch=lambda number, *_: numbers.append(number))

@@ -58,7 +58,7 @@ def test_forces_balance_and_nothing_is_exceeded(four, name):
 
 
 @pytest.mark.parametrize(("factors", "least"), [((1.01, 1.0), 0.001), ((1.0, 0.99), 0.005)], ids=["drag", "push"])
-def test_a_force_told_one_percent_wrong_does_other_work_than_the_body_stores(factors, least):
+def test_a_force_reported_one_percent_wrong_does_other_work_than_the_body_stores(factors, least):
     sticky = finite(STICKINESS[0])
     finger = published(4)
     state = solve_full_slip(finger.newton, LoadState(2.0, float(sticky.friction.mu), sticky.friction.cap, -1))
@@ -68,7 +68,7 @@ def test_a_force_told_one_percent_wrong_does_other_work_than_the_body_stores(fac
     assert least < wrong_audits["work_balance"] < 0.01
 
 
-def test_a_force_told_of_the_neighbouring_node_is_unbalanced_there():
+def test_a_force_assigned_to_the_neighbouring_node_is_unbalanced_there():
     sticky = finite(STICKINESS[0])
     finger = published(4)
     state = solve_full_slip(finger.newton, LoadState(2.0, float(sticky.friction.mu), sticky.friction.cap, -1))

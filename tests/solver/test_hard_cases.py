@@ -61,7 +61,7 @@ def test_near_incompressibility_costs_no_more_linear_systems(kinematics):
     assert all(systems(nu) <= usual_count + (0 if kinematics == "small" else 2) for nu in (0.499, 0.4999, 0.4999999))
 
 
-def test_a_case_that_fails_is_told_as_one():
+def test_a_case_that_fails_is_reported_as_one():
     """The suite can find fault: a refusal where there must be an answer, and a number that is not its neighbour's."""
     refusal = of_scene(Scene(friction=Friction(2.0), loading=Loading(2.0, "+x")))
     assert not refusal.answered
@@ -82,7 +82,7 @@ def test_the_suite_compares_a_case_with_its_neighbour_wherever_that_stands(monke
         assert next(row for row in rows if isinstance(row, HardCase)).flaw == "0.5 from last, not 0.001"
 
 
-def test_a_touch_that_is_not_hertz_s_is_told_as_one():
+def test_a_touch_that_is_not_hertz_s_is_reported_as_one():
     # its contact is as wide as the epidermis is thick
     scene = Scene(friction=Friction(0.3), loading=Loading(0.1, "+x"))
     assert "from Hertz's" in of_light_touch(scene).flaw

@@ -124,7 +124,7 @@ def test_a_finger_handed_in_as_arrays_is_refused_beyond_the_friction_that_anothe
 
 @SLOW
 @pytest.mark.parametrize("layers", [8, 12])
-def test_what_is_crushed_beside_a_rigid_core_is_told_as_not_known_whatever_the_mesh(layers):
+def test_what_is_crushed_beside_a_rigid_core_is_reported_as_not_known_whatever_the_mesh(layers):
     # a half cylinder around a rigid core, pressed by a third of its thickness: in its corners det F falls below 0.3
     # on any mesh, on finer ones at less friction, so that no mesh tells a limit
     angle, part = np.linspace(-np.pi / 2, np.pi / 2, 10 * layers + 1), np.linspace(0.35, 1.0, 2 * layers + 1)
@@ -136,7 +136,7 @@ def test_what_is_crushed_beside_a_rigid_core_is_told_as_not_known_whatever_the_m
         finite_states.steady_body(newton.condensed.body, LoadState(1.0, 1.5, sense=TOWARDS_TIP), NeoHooke(0.08, 0.48))
 
 
-def test_no_limit_of_friction_is_told_where_growing_depth_arrives_beyond_it(monkeypatch):
+def test_no_limit_of_friction_is_reported_where_growing_depth_arrives_beyond_it(monkeypatch):
     scene = Scene(friction=Friction(0.6), loading=Loading(2.0, "-x"), solve=Solve("finite"))
     load = LoadState(2.0, 0.6, np.inf, TOWARDS_TIP)
     search = limit_point.BranchSearch(scene, load, BY_FRICTION, load.mu)

@@ -29,7 +29,7 @@ def test_a_step_that_fails_is_halved_and_the_rest_goes_in_steps_of_that_size():
     assert advance_up_to(0.3, StepControl()) == ([0.25, 0.5, 0.75, 1.0], [1.0, 0.5])
 
 
-def test_steps_grow_again_where_they_are_told_to():
+def test_steps_grow_again_where_they_are_asked_to():
     assert advance_up_to(0.3, StepControl(step_growth=2.0)) == ([0.25, 0.5, 0.75, 1.0], [1.0, 0.5, 0.75, 1.0])
 
 

@@ -57,7 +57,7 @@ def test_shorter_steps_leave_less_of_the_bones_work_over_and_simpsons_rule_next_
     assert fine["course_work_balance"] < coarse["course_work_balance"] / 8.0 < 1e-4
 
 
-def test_forces_told_one_percent_too_large_are_out_of_balance_with_what_is_stored(histories):
+def test_forces_reported_one_percent_too_large_are_out_of_balance_with_what_is_stored(histories):
     newton, (_, fine) = histories
     scaled = [replace(state, reaction=1.01 * state.reaction) for state in fine]
     audits = course_audits(newton, from_rest(newton, scaled))

@@ -34,7 +34,7 @@ def test_measured_differences_are_those_of_two_solves(measured_prediction):
 
 
 @pytest.mark.slow
-def test_the_estimate_stays_beside_the_measured_number_and_the_cost_is_told(measured_prediction):
+def test_the_estimate_stays_beside_the_measured_number_and_the_cost_is_reported(measured_prediction):
     assert "measured" in entry(measured_prediction, "bone compliance")["how"]
     assert entry(measured_prediction, "bone compliance")["estimated"] > 0.0
     assert measured_prediction.evidence_s > 0.0
@@ -43,7 +43,7 @@ def test_the_estimate_stays_beside_the_measured_number_and_the_cost_is_told(meas
     assert any("finite strain" in warning and "%" in warning for warning in measured_prediction.warnings)
 
 
-def test_a_difference_that_two_meshes_explain_is_not_told_as_one_of_the_kinematics():
+def test_a_difference_that_two_meshes_explain_is_not_reported_as_one_of_the_kinematics():
     scene = Scene(loading=Loading(1e-6, "none"), friction=Friction(0.0), solve=Solve(evidence="measured"))
     prediction = solve(scene)
     effect = entry(prediction, "finite strain")
@@ -59,7 +59,7 @@ def test_without_being_asked_nothing_is_measured_but_what_tissues_still_hold_and
     assert "marched" in entry(prediction, "viscosity")["how"]
 
 
-def test_a_bone_too_soft_to_count_as_rigid_is_told():
+def test_a_bone_too_soft_to_count_as_rigid_is_reported():
     slippery = replace(scene(SLIPPERINESS[4]), solve=Solve(tolerance=0.5))
     soft = replace(slippery, materials=replace(slippery.materials, bone=Material(1.0, 0.3)))
     assert any('finger.bone = "meshed"' in warning for warning in solve(soft).warnings)
@@ -68,7 +68,7 @@ def test_a_bone_too_soft_to_count_as_rigid_is_told():
 
 
 @pytest.mark.slow
-def test_a_scene_that_folds_at_finite_strain_is_told_at_small_strain():
+def test_a_scene_that_folds_at_finite_strain_is_reported_at_small_strain():
     prediction = solve(replace(scene(STICKINESS[4]), solve=Solve(tolerance=0.5, evidence="measured")))
     assert entry(prediction, "finite strain")["estimate"] is None
     assert 0.3 < entry(prediction, "finite strain")["from"]["limit_mu"] < 0.5

@@ -81,7 +81,7 @@ def test_the_end_of_a_course_that_has_nearly_settled_is_taken_up_as_the_settled_
 
 
 @pytest.mark.parametrize("kinematics", ["small", "finite"])
-def test_no_sed_is_told_where_contact_would_reach_beyond_the_skin_that_was_looked_at(kinematics):
+def test_no_sed_is_reported_where_contact_would_reach_beyond_the_skin_that_was_looked_at(kinematics):
     scene = Scene(friction=Friction(0.3), loading=Loading(0.2), solve=Solve(kinematics))
     (prediction,) = solve_many([scene])
     seds = slide_near(prediction).seds([replace(scene, loading=Loading(depth)) for depth in (0.21, 3.0)])

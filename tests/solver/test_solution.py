@@ -112,7 +112,7 @@ def test_the_estimate_lies_above_the_error_and_below_one_per_cent(ten):
         assert error < ten[title].error_estimate < 0.01
 
 
-def test_a_force_told_of_the_neighbouring_node_is_unbalanced_there():
+def test_a_force_assigned_to_the_neighbouring_node_is_unbalanced_there():
     sliding = Scene(friction=Friction(0.44, 0.02), loading=Loading(1.0, "-x"))
     finger = LinearFinger.of(sliding, Sizing(5, 1.0, margin=3.0))
     contact = solve_full_slip(finger.newton, LoadState(1.0, 0.44, 0.02, 1))
@@ -295,7 +295,7 @@ def test_a_run_can_be_stopped():
     assert len(solve_many(scenes()[:1], progress=lambda _: None)) == 1  # a listener that returns nothing stops nothing
 
 
-def test_a_prediction_is_told_as_plain_data_with_all_the_contract_asks_for(ten, histories):
+def test_a_prediction_is_reported_as_plain_data_with_all_the_contract_asks_for(ten, histories):
     document = ten["stickiness 100"].to_dict()
     for name in (
         "sed_ending",

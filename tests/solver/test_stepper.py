@@ -111,7 +111,7 @@ def test_pressed_much_deeper_than_its_mesh_was_made_for_it_ends_in_the_full_solv
     assert live.depth > 2.1
 
 
-def test_at_finite_strain_no_number_is_told_of_skin_that_folds_until_the_force_has_eased():
+def test_at_finite_strain_no_number_is_reported_of_skin_that_folds_until_the_force_has_eased():
     live = stepper(Scene(friction=Friction(1.0), loading=Loading(1.5, "+x"), solve=Solve("finite")))
     seds = [live.step(*forces) for forces in press_then_drag(2.0 / 15.0, -2.0 / 15.0)]
     first = int(np.flatnonzero(np.isnan(seds))[0])  # the full solve has no settled state there
@@ -158,7 +158,7 @@ def test_a_reading_may_be_a_number_of_any_kind():
 
 
 @pytest.mark.parametrize("readings_of_lift", [4, pytest.param(8, marks=pytest.mark.slow)])  # 20 and 40 ms at 200 Hz
-def test_a_finger_that_lifts_quickly_is_told_of_as_it_is(readings_of_lift):
+def test_a_finger_that_lifts_quickly_is_reported_as_it_is(readings_of_lift):
     finger, mu = finger_on_mesh("finite", 5), 0.4
     live = stepper_on_mesh("finite", mu)
     part = np.linspace(0.0, 1.0, readings_of_lift + 1)[1:-1]

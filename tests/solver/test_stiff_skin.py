@@ -40,7 +40,7 @@ def end_refinement(monkeypatch, finer, *, error=None):
     return finenesses
 
 
-def test_an_answer_that_a_finer_mesh_does_not_find_is_told_as_the_coarser_has_it_with_a_sentence(monkeypatch):
+def test_an_answer_that_a_finer_mesh_does_not_find_is_reported_as_the_coarser_has_it_with_a_sentence(monkeypatch):
     scene = stiffening_scene(0.3, 0.01)
     coarse = solve(replace(scene, solve=replace(scene.solve, tolerance=0.5)))
     finenesses = end_refinement(monkeypatch, NotConverged("lost"), error=return_nine)
@@ -66,7 +66,9 @@ def test_a_state_that_a_finer_mesh_puts_far_beyond_its_limit_is_refused_with_tha
 
 
 @pytest.mark.parametrize("tolerance", [0.01, None])
-def test_a_state_as_near_its_limit_as_limits_are_known_is_told_by_a_coarser_mesh_with_a_warning(monkeypatch, tolerance):
+def test_a_state_as_near_its_limit_as_limits_are_known_is_reported_by_a_coarser_mesh_with_a_warning(
+    monkeypatch, tolerance
+):
     failure = NoSteadyState("beyond", limit_mu=0.299)
     end_refinement(monkeypatch, failure, error=return_nine)
     prediction = solve(stiffening_scene(0.3, tolerance))

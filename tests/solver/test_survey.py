@@ -68,7 +68,7 @@ def test_a_common_error_of_all_surfaces_falls_out_of_their_differences():
     assert answers.apart(TRUTH + 0.3, np.array([TRUTH, TRUTH, TRUTH])) == pytest.approx((0.0, 0.0), abs=1e-15)
 
 
-def test_a_difference_that_is_off_is_told_by_the_range_and_so_is_the_doubt_of_the_truth():
+def test_a_difference_that_is_off_is_reported_by_the_range_and_so_is_the_doubt_of_the_truth():
     first = np.array([1.0, 0.0, 0.0])
     doubtful = TRUTH + 0.3 * first
     error, doubt = answers.apart(TRUTH + 0.2 * first, np.array([TRUTH, TRUTH, doubtful]))

@@ -26,7 +26,7 @@ def refusal_of(scene):
     return failure.value
 
 
-def test_where_a_drag_lifts_the_bone_the_slide_is_found_as_the_course_finds_it_and_is_told():
+def test_where_a_drag_lifts_the_bone_the_slide_is_found_as_the_course_finds_it_and_is_reported():
     prediction = solve(pressed_scene(0.1, 1.5, course="history"))
     # the expected depth is that of a mesh of four times as many elements
     assert prediction.indentation == pytest.approx(0.229, rel=prediction.indentation_error)
@@ -38,7 +38,7 @@ def test_where_a_drag_lifts_the_bone_the_slide_is_found_as_the_course_finds_it_a
     assert by_depth.normal_force < 0.5 * prediction.normal_force
 
 
-def test_a_drag_that_does_not_lift_the_bone_is_not_told():
+def test_a_drag_that_does_not_lift_the_bone_is_not_reported():
     assert not any(LIFTED in warning for warning in solve(pressed_scene(0.03, 1.5)).warnings)
 
 
@@ -102,14 +102,14 @@ def test_an_earlier_slide_without_a_settled_state_is_refused_with_its_limits_whe
 
 
 @pytest.mark.slow
-def test_an_earlier_slide_without_a_settled_state_is_told_where_the_last_one_alone_is_solved():
+def test_an_earlier_slide_without_a_settled_state_is_reported_where_the_last_one_alone_is_solved():
     prediction = solve(driven_scene(2.0, 1.25, ("-x", "+x")))
     (warning,) = (text for text in prediction.warnings if "A slide before this one" in text)
     assert "along -x at 2 mm" in warning
 
 
 @pytest.mark.slow
-def test_at_finite_strain_an_earlier_slide_whose_skin_folds_is_told():
+def test_at_finite_strain_an_earlier_slide_whose_skin_folds_is_reported():
     scene = Scene(friction=Friction(0.67), loading=Loading(2.0, ("+x", "-x")), solve=Solve("finite", "steady", COARSE))
     assert any("the skin behind the contact folds" in warning for warning in solve(scene).warnings)
 

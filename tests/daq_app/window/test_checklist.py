@@ -63,7 +63,7 @@ def test_a_broken_protocol_is_named_with_its_file_before_start(form, tmp_path):
     assert "\n" not in protocol_card.text
 
 
-def test_a_disk_without_room_for_the_session_is_told_before_start(form, monkeypatch, tmp_path):
+def test_a_disk_without_room_for_the_session_is_reported_before_start(form, monkeypatch, tmp_path):
     monkeypatch.setattr(storage.shutil, "disk_usage", lambda _: type("Usage", (), {"free": 10**6})())
     monkeypatch.chdir(tmp_path)
     full = card(replace(form, folder="recordings"), "Disk")

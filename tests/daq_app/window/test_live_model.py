@@ -126,7 +126,7 @@ def test_forces_beyond_its_reach_are_marked_and_the_next_touch_is_followed_again
     assert not follower.take(Forces(np.array([7.0]), np.array([1.0]), np.array([0.0]), 0, 1)).beyond
 
 
-def test_the_full_solve_is_told_beside_the_mean_of_what_was_shown_over_the_steady_window(follower, monkeypatch):
+def test_the_full_solve_is_reported_beside_the_mean_of_what_was_shown_over_the_steady_window(follower, monkeypatch):
     monkeypatch.setattr("daq_app.window.live_follower.solve", solve_once)
     shown_values = follower.take(forces_of(stroke(), FRAME))
     settled = follower.settled_solver(Settle(PLAN, FRICTION, NORMAL, (1.2, 2.0)))()

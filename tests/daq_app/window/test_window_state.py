@@ -208,7 +208,7 @@ def test_what_is_wrong_is_one_banner_with_what_can_be_done(messages, grade, word
     assert banner.sends == sends
 
 
-def test_a_disk_that_took_no_more_is_told_with_what_is_safe_once():
+def test_a_disk_that_took_no_more_is_reported_with_what_is_safe_once():
     reason = "the disk took no more (database or disk is full); all that was measured is safe: free space, and resume"
     end = replace(LOST, cause="disk", reason=reason)
     banner = derive_view(after(*MOUNT, m.SessionEnded("recordings/P07", end, True))).banner

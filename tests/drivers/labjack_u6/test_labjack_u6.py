@@ -203,7 +203,7 @@ def test_one_saturated_gauge_invalidates_the_reading_and_is_named_in_its_status(
     assert set(block.status[block.status > 0].tolist()) == {1 << 10}, "gauge 2, and no other"
 
 
-def test_what_an_overflow_cost_is_told_by_the_converter_and_counted(plug_in, cal, monkeypatch):
+def test_what_an_overflow_cost_is_reported_by_the_converter_and_counted(plug_in, cal, monkeypatch):
     clock = RealClock()
     device = plug_in(box(clock))
     transducer = open_transducer(f"labjack-u6://?cal={cal}&rate=2000", clock)

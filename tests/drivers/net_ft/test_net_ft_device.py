@@ -318,7 +318,7 @@ def test_starting_twice_is_refused_and_starting_again_after_a_stop_begins_anew()
     assert transducer.health.lost == 0
 
 
-def test_waiting_is_told_in_the_sessions_clock():
+def test_waiting_is_reported_in_the_sessions_clock():
     link = MemoryLink(line(0, 5))
     transducer = transducer_on(link, clock=PacedClock(1000.0))
     transducer.start()

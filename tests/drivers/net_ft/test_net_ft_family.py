@@ -68,7 +68,7 @@ def test_buffered_streaming_brings_the_same_readings_many_to_a_datagram(start_bo
     np.testing.assert_allclose(np.diff(block.time), 0.001, rtol=1e-9)
 
 
-def test_a_bias_is_set_where_the_address_asks_for_it_and_told(start_box):
+def test_a_bias_is_set_where_the_address_asks_for_it_and_reported(start_box):
     box = start_box(Bench(3, BenchSettings(offset=(1.0, -2.0, 3.0, 40.0, 50.0, 60.0))))
     untouched = open_transducer(box.uri, CLOCK)
     before = stream(untouched, 0.5).raw.mean(axis=0)
@@ -83,7 +83,7 @@ def test_a_bias_is_set_where_the_address_asks_for_it_and_told(start_box):
     assert re.match(r"set at opening, as the address asks; at most 0(\.0\d+)? N and ", setting)
 
 
-def test_a_latch_is_reset_where_the_address_asks_for_it_and_told(start_box):
+def test_a_latch_is_reset_where_the_address_asks_for_it_and_reported(start_box):
     info = open_transducer(f"{start_box().uri}&latch=reset", CLOCK).info
     setting = info.settings["monitor condition latch"]
     assert setting == "reset at opening, as the address asks, and read back as not latched"

@@ -82,7 +82,7 @@ def test_the_rate_asked_for_is_set_and_read_back(start_box):
     assert np.diff(block.counter).tolist() == [46] * (len(block) - 1)
 
 
-def test_a_rate_that_somebody_changes_on_the_web_page_is_told_in_words_and_times_stay_true(start_box):
+def test_a_rate_that_somebody_changes_on_the_web_page_is_reported_in_words_and_times_stay_true(start_box):
     box = start_box()
     transducer = open_transducer(box.uri, PacedClock(10.0))
     transducer.start()
@@ -159,7 +159,7 @@ def test_a_wrench_is_the_same_in_whatever_units_the_box_counts(start_box, units)
     np.testing.assert_allclose(info.calibration.rated, [36.0] * 3 + [500.0] * 3, rtol=1e-6)
 
 
-def test_two_programs_that_take_the_stream_from_each_other_are_told(start_box):
+def test_two_programs_that_take_the_stream_from_each_other_are_reported(start_box):
     box = start_box(clock=RealClock())
     first, second = (open_transducer(box.uri, RealClock()) for _ in range(2))
     first.start()

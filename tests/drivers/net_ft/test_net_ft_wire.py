@@ -95,7 +95,7 @@ def test_a_record_is_36_bytes():
         (0x00008001, ("unknown bit 15", "unknown bit 0")),
     ],
 )
-def test_a_status_word_is_told_in_words(status, words):
+def test_a_status_word_is_reported_in_words(status, words):
     assert NET_FT.words(status) == words
 
 

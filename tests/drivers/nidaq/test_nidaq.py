@@ -79,7 +79,7 @@ def test_an_overflow_in_the_library_is_a_gap_and_the_stream_goes_on(library, add
     assert np.all(np.diff(block.time) > 0)
 
 
-def test_an_unknown_device_and_a_missing_library_are_told_in_one_sentence(library, address, monkeypatch):
+def test_an_unknown_device_and_a_missing_library_are_reported_in_one_sentence(library, address, monkeypatch):
     with pytest.raises(SetupError, match="there is no device dev7; NI-DAQmx knows Dev1"):
         open_nidaq(parse_address(address.uri.replace("Dev1", "Dev7")), RealClock(), Deadline.for_opening())
     with pytest.raises(SetupError, match="write nidaq://Dev1"):
