@@ -11,7 +11,7 @@ from daq_app.analyst.finger_words import MEAN_PANELS, compare_reports, film_text
 from daq_app.analyst.frame import FIELD_ERRORS, Film, Frame, FrameMesh, Instant
 from daq_app.analyst.session_words import picture_errors, sed_text
 from daq_app.analyst.stroke import RawFile, decision_of, effective_decision, history, reversal
-from daq_app.batch.derived import analysis_document, stored_options, stored_settings
+from daq_app.batch.derived import PREDICTION, analysis_document, stored_document, stored_options, stored_settings
 from daq_app.console import is_ours
 from daq_app.wording import tr
 from drivers.arrays import Array
@@ -325,7 +325,11 @@ def _open_recording(folder: Path) -> Recording:
 
 
 def _options(recording: Recording) -> PredictionOptions:
-    """Return the options of the kept prediction, or the defaults, without the parts that this window does not show."""
+    """Return the options of the kept prediction, or the defaults, without the parts that this window does not show.
+
+    Raises RecordingError if that prediction is damaged: default options would give another one.
+    """
+    stored_document(recording.folder, PREDICTION)
     return replace(stored_options(recording), intervals=False, variants="none", variant_intervals=False)
 
 

@@ -35,6 +35,16 @@ def test_the_window_and_a_fit_name_a_damaged_analysis_and_do_not_take_default_se
         Work(small, lambda _: None)
 
 
+def test_the_window_shows_strokes_beside_a_damaged_prediction_and_predicts_with_no_options_of_its_own(small):
+    (small / "prediction.json").write_text("{")
+    replies = []
+    work = Work(small, replies.append)
+    assert replies[-1].report.strokes
+    with pytest.raises(RecordingError, match="'daq-app predict' computes it again"):
+        work.go_on()
+    assert work.unfinished
+
+
 def test_a_damaged_prediction_is_made_anew_and_the_loss_of_what_was_set_in_it_is_named(small, capsys):
     (small / "prediction.json").write_text("{")
     assert run(["predict", str(small)]) == 3
