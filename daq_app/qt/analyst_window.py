@@ -14,20 +14,9 @@ from daq_app.analyst.process import Analyst
 from daq_app.analyst.session_words import Link, greatest_errors, lineage, marks_of, points, progress_text, row_text
 from daq_app.analyst.state import AnalystState, fold, rows, selected_row
 from daq_app.qt.keys import ANALYST_KEYS, KeysPage
+from daq_app.qt.layout import hbox, scroll_area, set_horizontal, vbox
 from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
-from daq_app.qt.parts import (
-    Panel,
-    WrappedLabel,
-    button,
-    choice,
-    hbox,
-    label,
-    row_list,
-    scroll_area,
-    set_horizontal,
-    vbox,
-    whole_facts,
-)
+from daq_app.qt.parts import Panel, WrappedLabel, button, choice, label, row_list, whole_facts
 from daq_app.qt.plots import ZoomedPlot, pg
 from daq_app.qt.stroke_column import StrokeColumn
 from daq_app.qt.tokens import GRID, MODEL, Tokens, px, theme_of
@@ -47,13 +36,10 @@ class LineageLabel(QLabel):
     followed = Signal(str)  # target of the link
 
     def __init__(self) -> None:
-        super().__init__()
+        flags = Qt.TextInteractionFlag.LinksAccessibleByMouse | Qt.TextInteractionFlag.LinksAccessibleByKeyboard
+        super().__init__(textFormat=Qt.TextFormat.RichText, wordWrap=True, textInteractionFlags=flags)
         self._links: tuple[Link, ...] = ()
-        self.setTextFormat(Qt.TextFormat.RichText)
-        self.setWordWrap(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        flags = Qt.TextInteractionFlag
-        self.setTextInteractionFlags(flags.LinksAccessibleByMouse | flags.LinksAccessibleByKeyboard)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.linkActivated.connect(self.followed.emit)
         self.linkHovered.connect(self._show_tool_tip)
@@ -102,8 +88,7 @@ class AnalystWindow(QMainWindow):
         self.trials = TrialsColumn(tokens, self.ask, self.take)
         self.stroke = StrokeColumn(tokens, self.ask, self._replay_next)
         self.model = ModelColumn(tokens, self.ask, self._progress_label.show_text)
-        self.progress = QProgressBar()
-        self.progress.setFormat("%p %")
+        self.progress = QProgressBar(format="%p %")
         self.progress.setAccessibleName(tr("progress"))
         self.stop = button(tr("Stop  Esc"), tr("stop the work"), lambda: self.ask(m.Stop()))
         name = tr("have the model answer the trials that are left")

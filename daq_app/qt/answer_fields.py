@@ -18,7 +18,8 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QAbstractSlider, QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
-from daq_app.qt.parts import button, entry, fill
+from daq_app.qt.layout import fill
+from daq_app.qt.parts import button, entry
 from daq_app.qt.tokens import GRID, px, theme_of
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 from daq_app.window.subject import LEAP, LENGTH, STEP, Answer, Choice, Device, Translate, Which

@@ -6,20 +6,9 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QComboBox, QPushButton, QSizePolicy, QWidget
 
+from daq_app.qt.layout import hbox, scroll_area, vbox
 from daq_app.qt.painting import Lamp
-from daq_app.qt.parts import (
-    EntryLine,
-    Panel,
-    WrappedLabel,
-    button,
-    choice,
-    hbox,
-    label,
-    label_grid,
-    scroll_area,
-    set_text,
-    vbox,
-)
+from daq_app.qt.parts import EntryLine, Panel, WrappedLabel, button, choice, label, label_grid, set_text
 from daq_app.qt.tokens import GRID, px, theme_of
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
 from daq_app.window.live_feed import LOADS

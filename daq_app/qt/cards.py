@@ -11,20 +11,8 @@ from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from daq_app.qt.bench_panel import show_connecting
-from daq_app.qt.parts import (
-    Panel,
-    Part,
-    WrappedLabel,
-    button,
-    choice,
-    field,
-    fill,
-    hbox,
-    label,
-    regrade,
-    set_text,
-    vbox,
-)
+from daq_app.qt.layout import Part, fill, hbox, vbox
+from daq_app.qt.parts import Panel, WrappedLabel, button, choice, field, label, regrade, set_text
 from daq_app.qt.preferences import Millimetres, name_of
 from daq_app.qt.subject_picture import Thumbnail
 from daq_app.qt.tokens import GRID, missing_glyphs

@@ -8,7 +8,8 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QListWidget, QWidget
 
 from daq_app.qt.keys import KEYS
-from daq_app.qt.parts import EntryLine, Panel, button, hbox, label, row_list, set_text, stack_pages, vbox, whole_facts
+from daq_app.qt.layout import hbox, stack_pages, vbox
+from daq_app.qt.parts import EntryLine, Panel, button, label, row_list, set_text, whole_facts
 from daq_app.qt.preferences import type_scale
 from daq_app.qt.subject_picture import Mirror
 from daq_app.qt.tokens import GRID, TARGET, px

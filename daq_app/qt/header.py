@@ -7,8 +7,9 @@ from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QApplication, QBoxLayout, QSizePolicy, QWidget
 
+from daq_app.qt.layout import hbox, set_horizontal
 from daq_app.qt.painting import Lamp, paint_arrow
-from daq_app.qt.parts import Panel, button, hbox, label, regrade, set_horizontal, set_text
+from daq_app.qt.parts import Panel, button, label, regrade, set_text
 from daq_app.qt.preferences import name_of
 from daq_app.qt.tokens import GRID, SMALL, TARGET, font, px, theme_of
 from daq_app.window.state import Message

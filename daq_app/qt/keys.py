@@ -7,7 +7,8 @@ from PySide6.QtCore import QElapsedTimer, QEvent, QObject, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
 
-from daq_app.qt.parts import Panel, button, hbox, is_text_field, label, label_grid, scroll_area, vbox
+from daq_app.qt.layout import hbox, scroll_area, vbox
+from daq_app.qt.parts import Panel, button, is_text_field, label, label_grid
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID, px
 from daq_app.window.subject import owner

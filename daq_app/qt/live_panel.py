@@ -7,9 +7,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
 
+from daq_app.qt.layout import hbox, set_horizontal, vbox
 from daq_app.qt.live_pictures import ContactMap, FingerView
 from daq_app.qt.live_plot import Curve, LivePlot
-from daq_app.qt.parts import Drawer, Panel, button, choice, hbox, label, regrade, set_horizontal, set_text, vbox
+from daq_app.qt.parts import Drawer, Panel, button, choice, label, regrade, set_text
 from daq_app.qt.preferences import settings
 from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, SMALL, TEXT, TITLE, N, T, font, px
 from daq_app.window.course_state import PICTURE, Mark, picture_end

@@ -15,9 +15,9 @@ from daq_app.qt.bridge import Bridge
 from daq_app.qt.course_panel import ACTS, CoursePanel
 from daq_app.qt.header import Header, Notice, ToDo
 from daq_app.qt.keys import KeysPage
+from daq_app.qt.layout import fill, hbox, scroll_area, stack_pages, vbox
 from daq_app.qt.middle import Middle
 from daq_app.qt.new_session_page import NewSessionPage
-from daq_app.qt.parts import fill, hbox, scroll_area, stack_pages, vbox
 from daq_app.qt.preferences import LANGUAGE, SCALE, THEME, millimetres, restore_place, save_place, type_scale
 from daq_app.qt.rooms import ROOMS, Menus, Rail, Room, Rooms
 from daq_app.qt.subject_picture import open_preview

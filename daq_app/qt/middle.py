@@ -8,21 +8,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QPushButton, QScrollArea, QWidget
 
 from daq_app.qt.bridge import Bridge
+from daq_app.qt.layout import hbox, scroll_area, stack_pages, vbox
 from daq_app.qt.live_panel import PLOTS, LivePanel, short_name, speech
 from daq_app.qt.live_plot import LivePlot
-from daq_app.qt.parts import (
-    Panel,
-    WrappedLabel,
-    button,
-    hbox,
-    label,
-    label_grid,
-    regrade,
-    scroll_area,
-    set_text,
-    stack_pages,
-    vbox,
-)
+from daq_app.qt.parts import Panel, WrappedLabel, button, label, label_grid, regrade, set_text
 from daq_app.qt.tokens import GRID, SMALL, TARGET, px
 from daq_app.window.course_state import PICTURE, Mark
 from daq_app.window.live_trace import Columns

@@ -13,7 +13,8 @@ from daq_app.analyst.session_words import picture_errors, scene_table, session_p
 from daq_app.analyst.state import AnalystState, Row, selected_row
 from daq_app.qt.finger_canvas import FingerCanvas
 from daq_app.qt.finger_painter import Look
-from daq_app.qt.parts import WrappedLabel, button, choice, hbox, vbox
+from daq_app.qt.layout import hbox, vbox
+from daq_app.qt.parts import WrappedLabel, button, choice
 from daq_app.qt.pictures import FILM_SUFFIXES, ComparedView, PictureView, SaveButtons, write_film, write_picture
 from daq_app.qt.plots import LINE, OWN, FieldBar, FieldPlot
 from daq_app.qt.tables import TextTable

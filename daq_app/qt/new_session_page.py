@@ -7,20 +7,8 @@ from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QComboBox, QCompleter, QFileDialog, QRadioButton, QWidget
 
 from daq_app.qt.cards import CardFrame, CutShort, ScreenFields, TransducerRow
-from daq_app.qt.parts import (
-    Panel,
-    WrappedLabel,
-    button,
-    choice,
-    entry,
-    field,
-    hbox,
-    label,
-    scroll_area,
-    set_horizontal,
-    tick,
-    vbox,
-)
+from daq_app.qt.layout import hbox, scroll_area, set_horizontal, vbox
+from daq_app.qt.parts import Panel, WrappedLabel, button, choice, entry, field, label, tick
 from daq_app.qt.tokens import GRID, TARGET, px
 from daq_app.window.checklist import CARD_FIELDS, Card, checklist, codes_in, first_missing, next_code, studies_in
 from daq_app.window.new_session import Bench, SessionForm, enrol_subject, enrolment, optional_phases

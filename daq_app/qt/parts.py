@@ -2,47 +2,37 @@
 
 import re
 from collections.abc import Callable, Iterable
-from typing import TypeVar
 
 from PySide6.QtCore import QByteArray, QEvent, QSize, Qt
 from PySide6.QtGui import QKeyEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
-    QBoxLayout,
     QCheckBox,
     QComboBox,
     QFrame,
     QGridLayout,
-    QHBoxLayout,
     QLabel,
-    QLayout,
     QLineEdit,
     QListWidget,
     QPushButton,
-    QScrollArea,
     QSizePolicy,
     QSplitter,
-    QStackedWidget,
     QVBoxLayout,
     QWidget,
 )
 
+from daq_app.qt.layout import hbox, vbox
 from daq_app.qt.preferences import DRAWER, DRAWER_SIZES, settings
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.wording import tr
 
-Margins = int | tuple[int, int, int, int]  # around a layout: left, top, right, bottom [px]
-B = TypeVar("B", bound=QBoxLayout)
-Part = QWidget | QLayout | int | tuple[QWidget | QLayout, int]  # with its stretch; a number is an empty stretch
 SHARES = (500, 300)  # of the width, before the handle is moved [-]
 
 
 def label(text: str = "", role: str = "value", *, wrap: bool = False) -> QLabel:
     """Return a label; `role` is one of the style sheet's."""
-    text_label = QLabel(text)
+    text_label = QLabel(text, textFormat=Qt.TextFormat.PlainText, wordWrap=wrap)
     text_label.setProperty("role", role)
-    text_label.setWordWrap(wrap)
-    text_label.setTextFormat(Qt.TextFormat.PlainText)
     return text_label
 
 
@@ -91,12 +81,10 @@ class WrappedLabel(QLabel):
 
         So changing text does not move the parts around it.
         """
-        super().__init__()
+        super().__init__(textFormat=Qt.TextFormat.PlainText, wordWrap=True)
         self._keeps_room, self._least = keeps_room, 1
         self.setProperty("role", role)
         self.setProperty("grade", grade)
-        self.setTextFormat(Qt.TextFormat.PlainText)
-        self.setWordWrap(True)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
 
     def show_text(self, text: str) -> None:
@@ -131,11 +119,10 @@ class WrappedLabel(QLabel):
 
 def button(text: str, name: str, act: Callable[[], object], role: str = "", *, checkable: bool = False) -> QPushButton:
     """Return a button named `name` for screen readers; with `checkable` it stays pressed until the next press."""
-    push = QPushButton(text)
+    push = QPushButton(text, autoDefault=False)
     push.setAccessibleName(name)
     if role:
         push.setProperty("role", role)
-    push.setAutoDefault(False)
     push.setCheckable(checkable)
     push.clicked.connect(lambda: act())
     return push
@@ -209,51 +196,6 @@ def is_text_field(widget: QWidget | None) -> bool:
     return isinstance(widget, QLineEdit | QAbstractSpinBox) and not widget.isReadOnly()
 
 
-def fill(layout: B, *parts: Part) -> B:
-    """Append parts to a layout and return it."""
-    for item in parts:
-        content, stretch = item if isinstance(item, tuple) else (item, 0)
-        if isinstance(content, QWidget):
-            layout.addWidget(content, stretch)
-        elif isinstance(content, QLayout):
-            layout.addLayout(content, stretch)
-        else:
-            layout.addStretch(content)
-    return layout
-
-
-def hbox(*parts: Part, on: QWidget | None = None, margins: Margins = 0, spacing: int | None = None) -> QHBoxLayout:
-    """Return a row of parts, as the layout of a widget or within another layout."""
-    return _arrange(QHBoxLayout(), parts, on, margins, spacing)
-
-
-def vbox(*parts: Part, on: QWidget | None = None, margins: Margins = 0, spacing: int | None = None) -> QVBoxLayout:
-    """Return a column of parts, as the layout of a widget or within another layout."""
-    return _arrange(QVBoxLayout(), parts, on, margins, spacing)
-
-
-def _arrange(layout: B, parts: tuple[Part, ...], on: QWidget | None, margins: Margins, spacing: int | None) -> B:
-    layout.setContentsMargins(*(margins if isinstance(margins, tuple) else (margins,) * 4))
-    if spacing is not None:
-        layout.setSpacing(spacing)
-    if on is not None:
-        on.setLayout(layout)
-    return fill(layout, *parts)
-
-
-def set_horizontal(layout: QBoxLayout, horizontal: bool) -> None:
-    """Arrange the parts of a layout in a row, or in a column."""
-    layout.setDirection(QBoxLayout.Direction.LeftToRight if horizontal else QBoxLayout.Direction.TopToBottom)
-
-
-def stack_pages(*pages: QWidget) -> QStackedWidget:
-    """Return a stack of pages that shows the first."""
-    stack = QStackedWidget()
-    for page in pages:
-        stack.addWidget(page)
-    return stack
-
-
 def label_grid(values: Iterable[tuple[str, QWidget]], across: int = 1, role: str = "quiet") -> QGridLayout:
     """Return a grid of labelled widgets, `across` pairs in a row, labels in a role of the style sheet."""
     grid = QGridLayout()
@@ -266,17 +208,6 @@ def label_grid(values: Iterable[tuple[str, QWidget]], across: int = 1, role: str
         grid.addWidget(widget, row, column + 1)
         grid.setColumnStretch(column + 1, 1)
     return grid
-
-
-def scroll_area(inside: QWidget, area: QScrollArea | None = None) -> QScrollArea:
-    """Return a frameless scroll area, a new one unless given, around `inside`."""
-    area = area or QScrollArea()
-    area.setWidget(inside)
-    area.setWidgetResizable(True)
-    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    inside.setObjectName("inside")
-    area.setStyleSheet("QScrollArea, QWidget#inside { background: transparent; border: none; }")
-    return area
 
 
 def regrade(widget: QWidget, value: str, property_name: str = "grade") -> None:
@@ -315,8 +246,7 @@ def tick(text: str, name: str) -> QCheckBox:
 
 def entry(name: str, empty: str = "") -> QLineEdit:
     """Return an input line named `name` for screen readers, with the placeholder `empty`."""
-    line = QLineEdit()
-    line.setPlaceholderText(empty)
+    line = QLineEdit(placeholderText=empty)
     line.setAccessibleName(name)
     return line
 
@@ -355,11 +285,10 @@ class Drawer(QSplitter):
     """A permanent part with a drawer on its right, whose openness and width are remembered."""
 
     def __init__(self, main: QWidget, drawer: QWidget) -> None:
-        super().__init__(Qt.Orientation.Horizontal)
+        super().__init__(Qt.Orientation.Horizontal, childrenCollapsible=False)
         self._main, self._drawer = main, drawer
         self.addWidget(main)
         self.addWidget(drawer)
-        self.setChildrenCollapsible(False)
         for index, share in enumerate(SHARES):
             self.setStretchFactor(index, share)
         self.setSizes(list(SHARES))

@@ -17,8 +17,9 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QProgressDialog, QPushB
 
 from daq_app.analyst.finger_words import MEAN_PANELS, ComparisonRows
 from daq_app.qt.finger_canvas import FingerCanvas
+from daq_app.qt.layout import hbox, vbox
 from daq_app.qt.painting import paint_fitted
-from daq_app.qt.parts import button, hbox, label, set_text, vbox
+from daq_app.qt.parts import button, label, set_text
 from daq_app.qt.tables import TextTable
 from daq_app.qt.tokens import GRID
 from daq_app.wording import tr, tr_noop
@@ -168,12 +169,11 @@ def write_film(canvas: FingerCanvas, heading: str, show: Callable[[int], None], 
 
     The suffix decides between MP4 and GIF (default). The window keeps running behind a dialog that can cancel.
     """
-    dialog = QProgressDialog(tr("Writing the film"), "", 0, count + 1, canvas.window())
+    dialog = QProgressDialog(tr("Writing the film"), "", 0, count + 1, canvas.window(), minimumDuration=0)
     cancel = QPushButton(tr("Cancel"))
     cancel.setAccessibleName(tr("cancel the film"))
     dialog.setCancelButton(cancel)
     dialog.setWindowModality(Qt.WindowModality.WindowModal)
-    dialog.setMinimumDuration(0)
     frames: list[Image.Image] = []
     try:
         for index in range(count):

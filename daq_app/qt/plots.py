@@ -10,7 +10,8 @@ from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QMouseEvent, 
 from PySide6.QtWidgets import QDoubleSpinBox, QWidget
 
 from daq_app.analyst.frame import FIELD_CHOICES, FieldChoice, Frame, Line, Range, along_line, along_skin, read_out
-from daq_app.qt.parts import button, choice, hbox, label, vbox
+from daq_app.qt.layout import hbox, vbox
+from daq_app.qt.parts import button, choice, label
 from daq_app.qt.preferences import type_scale
 from daq_app.qt.tokens import GRID, MODEL, SMALL, TARGET, Tokens, font
 from daq_app.window.live_trace import scale_step
@@ -290,13 +291,11 @@ class _NumberField(QDoubleSpinBox):
     """A number field with a decimal point in every locale; a comma counts as a point."""
 
     def __init__(self, name: str) -> None:
-        super().__init__()
+        super().__init__(minimum=-_LARGEST, maximum=_LARGEST, decimals=3)
         self.setLocale(QLocale.c())
         self.setAccessibleName(name)
         self.lineEdit().setAccessibleName(name)
         self.setMinimumHeight(TARGET)
-        self.setRange(-_LARGEST, _LARGEST)
-        self.setDecimals(3)
 
     def validate(self, text: str, pos: int) -> tuple[QValidator.State, str, int]:
         return super().validate(text.replace(",", "."), pos)

@@ -25,7 +25,8 @@ from PySide6.QtWidgets import (
 from daq_app.qt import preferences
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.keys import KEYS
-from daq_app.qt.parts import Panel, button, hbox, label, row_list, set_text, vbox
+from daq_app.qt.layout import hbox, vbox
+from daq_app.qt.parts import Panel, button, label, row_list, set_text
 from daq_app.qt.preferences import name_of, recent_sessions, remember_session
 from daq_app.qt.tokens import GRID, px, theme_of
 from daq_app.window.state import NewSession

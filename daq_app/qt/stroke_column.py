@@ -10,7 +10,8 @@ from daq_app.analyst import state as m
 from daq_app.analyst.session_words import FRICTION_HEAD, friction_table, numbers
 from daq_app.analyst.state import AnalystState, selected_row
 from daq_app.analyst.stroke import Edge, History
-from daq_app.qt.parts import WrappedLabel, button, entry, hbox, label, scroll_area, vbox
+from daq_app.qt.layout import hbox, scroll_area, vbox
+from daq_app.qt.parts import WrappedLabel, button, entry, label
 from daq_app.qt.pictures import SaveButtons
 from daq_app.qt.preferences import settings
 from daq_app.qt.stroke_view import StrokeView
@@ -50,10 +51,9 @@ class StrokeColumn(QWidget):
         self.tabs = QTabWidget()
         self.tabs.setAccessibleName(tr("numbers and readings"))
         inside = QWidget()
-        self._numbers = QFormLayout(inside)
+        growth = QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow
+        self._numbers = QFormLayout(inside, labelAlignment=Qt.AlignmentFlag.AlignLeft, fieldGrowthPolicy=growth)
         self._numbers.setContentsMargins(GRID, GRID // 2, GRID, GRID // 2)
-        self._numbers.setLabelAlignment(Qt.AlignmentFlag.AlignLeft)
-        self._numbers.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         self._scroll = scroll_area(inside)  # if space is short the numbers are scrolled, never cut
         self._scroll.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._scroll.setAccessibleName(tr("numbers of the stroke and its prediction"))

@@ -9,8 +9,8 @@ from PySide6.QtWidgets import QPushButton, QSizePolicy, QWidget
 
 from daq_app.analyst.frame import read_out
 from daq_app.analyst.stroke import EDGE_LEAP, EDGE_STEP, EDGES, Edge, EdgePosition, RawReadings, clamp_edge, edges_of
+from daq_app.qt.layout import hbox, vbox
 from daq_app.qt.painting import sheer
-from daq_app.qt.parts import hbox, vbox
 from daq_app.qt.plots import ZoomedPlot, pg
 from daq_app.qt.tokens import GRID, MU, SMALL, N, T, Tokens, font
 from daq_app.wording import tr, tr_noop

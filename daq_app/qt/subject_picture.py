@@ -6,8 +6,9 @@ from PySide6.QtCore import QEvent, QSize, Qt, QTimer
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent, QPixmap
 from PySide6.QtWidgets import QDialog, QListWidget, QSizePolicy, QWidget
 
+from daq_app.qt.layout import hbox, vbox
 from daq_app.qt.painting import paint_fitted
-from daq_app.qt.parts import Openness, WrappedLabel, button, hbox, label, vbox
+from daq_app.qt.parts import Openness, WrappedLabel, button, label
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID, missing_glyphs, px
 from daq_app.window.new_session import Refusal, SessionForm

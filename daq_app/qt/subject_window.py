@@ -7,7 +7,8 @@ from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent, QScreen, QShowEv
 from PySide6.QtWidgets import QApplication, QBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from daq_app.qt.answer_fields import ChoiceOfTwo, NumberField, PressBar, ScoreLine
-from daq_app.qt.parts import button, entry, hbox, label, set_text, stack_pages, vbox
+from daq_app.qt.layout import hbox, stack_pages, vbox
+from daq_app.qt.parts import button, entry, label, set_text
 from daq_app.qt.preferences import LEAST, MOST, millimetres, store_ruler_length
 from daq_app.qt.tokens import GRID, font, px
 from daq_app.window.subject import Kind, SubjectView, translator

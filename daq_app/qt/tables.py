@@ -17,7 +17,8 @@ from PySide6.QtGui import QFont, QGuiApplication, QKeyEvent, QKeySequence, QShow
 from PySide6.QtWidgets import QAbstractItemView, QTableView, QWidget
 
 from daq_app.analyst.stroke import RawReadings
-from daq_app.qt.parts import WrappedLabel, vbox
+from daq_app.qt.layout import vbox
+from daq_app.qt.parts import WrappedLabel
 from daq_app.qt.tokens import GRID
 from daq_app.wording import tr, tr_noop
 

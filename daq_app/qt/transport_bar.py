@@ -7,7 +7,8 @@ from PySide6.QtCore import QEasingCurve, QSignalBlocker, Qt, QTimeLine, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QSizePolicy, QSlider, QWidget
 
-from daq_app.qt.parts import button, choice, hbox, label, set_text
+from daq_app.qt.layout import hbox
+from daq_app.qt.parts import button, choice, label, set_text
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.wording import tr
 
@@ -44,9 +45,8 @@ class TransportBar(QWidget):
         self.time_label = label("", "quiet")
         self.time_label.setVisible(tells_time)
         hbox(self.play, self.back, self.forward, (self.slider, 1), self.time_label, self.speed, on=self, spacing=GRID)
-        self._line = QTimeLine(parent=self)  # from the first time to the last, at the chosen speed
-        self._line.setEasingCurve(QEasingCurve.Type.Linear)
-        self._line.setUpdateInterval(_TICK)
+        linear = QEasingCurve(QEasingCurve.Type.Linear)
+        self._line = QTimeLine(parent=self, easingCurve=linear, updateInterval=_TICK)  # from the first time to the last
         self._line.valueChanged.connect(lambda: self._show(self._time))
         self._line.finished.connect(self._enable)
         self._line.finished.connect(self.ended)
