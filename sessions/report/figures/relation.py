@@ -148,7 +148,7 @@ def relation_panel(experiment: Experiment, predictions: Sequence[PredictionFindi
     room = 0.18 * (high - low or abs(high))
     limits = [quantity.factor * limit for *_, friction in points for limit in friction or ()]
     lowest, highest = min([low - 0.75 * room, *limits]) - room / 4, max([high + 0.75 * room, *limits]) + room / 4
-    axes.set(xlim=(-6, 106), ylim=(lowest, highest), xticks=_TICKS)
+    axes.set(xlim=(-11, 106), ylim=(lowest, highest), xticks=_TICKS)
     score = "mean score" if any(m.n > 1 for m, *_ in points) else "score"
     axes.set_xlabel(f"{score} of {experiment.descriptor} [0–100]")
     axes.set_ylabel(f"predicted {quantity.label} [{quantity.unit}]")
