@@ -9,7 +9,7 @@ import sys
 import textwrap
 import threading
 import time
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, NoReturn, TextIO
@@ -117,7 +117,7 @@ class Console:
         """Return the exit code of a verb that ended with `code`."""
         return FLAWED if code == DONE and self._lost_results else code
 
-    def result(self, document: Mapping[str, Any]) -> None:
+    def result(self, /, **document: object) -> None:
         """Print the one JSON document, or nothing if a person reads. The format refuses NaN and infinity."""
         if self.as_json:
             self._end_progress()

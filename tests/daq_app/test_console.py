@@ -22,7 +22,7 @@ def test_with_json_stdout_holds_one_document_and_nothing_else():
     speaker.say("for people")
     speaker.progress(0.5, "half")
     speaker.note("a warning")
-    speaker.result({"a": 1.5})
+    speaker.result(a=1.5)
     assert json.loads(out.getvalue()) == {"a": 1.5}
     assert "a warning" in err.getvalue()
 
@@ -30,7 +30,7 @@ def test_with_json_stdout_holds_one_document_and_nothing_else():
 def test_without_json_the_document_stays_unsaid():
     speaker, out, _ = console(as_json=False)
     speaker.say("for people")
-    speaker.result({"a": 1})
+    speaker.result(a=1)
     assert out.getvalue() == "for people\n"
 
 
@@ -59,7 +59,7 @@ def test_a_full_disk_is_reported_with_what_could_not_be_written_and_where():
     for as_json in (True, False):
         speaker = Console(as_json=as_json, out=Full())
         with pytest.raises(NotWritten, match=r"the answer could not be written to standard output \(no space left"):
-            (speaker.result if as_json else speaker.say)({} if as_json else "")
+            speaker.result() if as_json else speaker.say("")
 
 
 def test_what_is_said_beside_the_answer_stops_nothing_where_it_cannot_be_written():
@@ -92,7 +92,7 @@ def test_a_package_that_is_missing_is_named_with_what_to_install(monkeypatch, ca
 def test_a_number_that_is_none_never_becomes_json():
     speaker, _, _ = console(as_json=True)
     with pytest.raises(ValueError, match="not JSON compliant"):
-        speaker.result({"a": float("nan")})
+        speaker.result(a=float("nan"))
 
 
 def test_the_part_shown_of_work_whose_end_nobody_knows_moves_and_never_goes_back_nor_ends_before_it():

@@ -40,7 +40,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.note(f"stopped; drawing the measurements made so far{remark}")
     console.progress(0.99, "drawing")
     write(results, options.out)
-    console.result({"page": str(options.out / PAGE), **results.to_dict()})
+    console.result(page=str(options.out / PAGE), **results.to_dict())
     page_tables = tables(results)
     if not results.stopped:
         for page, text in _docs(options, page_tables).items():

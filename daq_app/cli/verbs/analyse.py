@@ -30,7 +30,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         recording, console, area_law(options), seed=options.bootstrap_seed, gain_error=options.calibration_error
     )
     console.note(outdated_prediction(recording, analysis.settings))
-    console.result(analysis_document(analysis))
+    console.result(**analysis_document(analysis))
     console.say(recording.simulated_sentence)
     if not console.as_json:
         _print(recording, analysis, console)

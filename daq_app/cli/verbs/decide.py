@@ -73,7 +73,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         analyse_session(recording, console)
     older = (recording.folder / PREDICTION).is_file()
     changes = _changes(analysis, new_analysis)
-    console.result({"decision": line.to_dict(), "changes": changes, "prediction_is_older": older})
+    console.result(decision=line.to_dict(), changes=changes, prediction_is_older=older)
     console.say(recording.simulated_sentence, line.sentence, *changes)
     if older:
         console.say(f"{PREDICTION} was made before this decision: 'daq-app predict' computes it again")
@@ -109,7 +109,7 @@ def _tilt(options: argparse.Namespace, analysis: Analysis) -> Decision:
 def _list(decisions: Decisions, console: Console) -> int:
     in_force = {decision.number for decision in decisions.in_force}
     lines = [{**line.to_dict(), "in_force": line.number in in_force} for line in decisions.lines]
-    console.result({"decisions": lines, "problems": list(decisions.problems)})
+    console.result(decisions=lines, problems=decisions.problems)
     for line in decisions.lines:
         remark = "" if line.number in in_force or line.undoes is not None else " (no longer in force)"
         console.say(f"{line.made_utc}  {line.sentence}{remark}")

@@ -66,19 +66,19 @@ def _demonstrate(options: argparse.Namespace, results: Path, console: Console) -
 
     means = {(score.descriptor, score.index): score.mean for score in mean_scores(scores)}
     rows = _rows(study, analysis, prediction, means)
-    summary = {
-        "simulated": True,
-        "rows": rows,
-        "report": str(page),
-        "pictures": str(pictures),
-        "session": str(study.forces),
-        "readings": study.readings,
-        "lost": study.lost,
-        "flaws": [flaw.sentence for flaw in analysis.flaws],
-        "seconds": time.monotonic() - start,
-    }
-    console.result(summary)
-    _print(summary, rows, console)
+    flaws, seconds = [flaw.sentence for flaw in analysis.flaws], time.monotonic() - start
+    places = {"report": str(page), "pictures": str(pictures), "session": str(study.forces)}
+    console.result(
+        simulated=True, rows=rows, **places, readings=study.readings, lost=study.lost, flaws=flaws, seconds=seconds
+    )
+    console.say(
+        "",
+        _table(rows),
+        "",
+        f"{study.readings} readings, {study.lost} lost; {seconds:.1f} s in all",
+        *(f"flaw: {sentence}" for sentence in flaws),
+        *(f"{name:8}  {places[name]}" for name in ("session", "report", "pictures")),
+    )
     return FLAWED if analysis.flawed or study.lost else DONE
 
 
@@ -106,30 +106,15 @@ def _rows(
     return sorted(rows, key=lambda row: (row["descriptor"] != "stickiness", row["index"]))
 
 
-def _print(summary: Mapping[str, Any], rows: list[dict[str, Any]], console: Console) -> None:
-    header = ["SIMULATED", "true mu", "estimated", "true tau [kPa]", "estimated", "true V [mm/s]", "estimated"]
-    header += ["SED [kPa]", "mean score"]
+def _table(rows: list[dict[str, Any]]) -> str:
+    columns = (  # heading, key of a row, digits, and the heading's unit by the row's
+        ("true mu", "planted_mu", 3, 1.0), ("estimated", "mu", 3, 1.0),
+        ("true tau [kPa]", "planted_tau_max", 3, 1e3), ("estimated", "tau_max", 3, 1e3),
+        ("true V [mm/s]", "planted_speed", 3, 1.0), ("estimated", "speed", 3, 1.0),
+        ("SED [kPa]", "sed", 4, 1e3), ("mean score", "mean_score", 3, 1.0),
+    )  # fmt: skip
     cells = [
-        [
-            f"{row['descriptor']} {row['index']}",
-            number(row["planted_mu"]),
-            number(row["mu"]),
-            number(row["planted_tau_max"], factor=1e3),
-            number(row["tau_max"], factor=1e3),
-            number(row["planted_speed"]),
-            number(row["speed"]),
-            number(row["sed"], 4, factor=1e3),
-            number(row["mean_score"]),
-        ]
+        [f"{row['descriptor']} {row['index']}", *(number(row[key], n, factor=unit) for _, key, n, unit in columns)]
         for row in rows
     ]
-    console.say(
-        "",
-        table(cells, header=header),
-        "",
-        f"{summary['readings']} readings, {summary['lost']} lost; {summary['seconds']:.1f} s in all",
-        *(f"flaw: {sentence}" for sentence in summary["flaws"]),
-        f"session   {summary['session']}",
-        f"report    {summary['report']}",
-        f"pictures  {summary['pictures']}",
-    )
+    return table(cells, header=["SIMULATED", *(heading for heading, *_ in columns)])

@@ -40,7 +40,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     devices = reachable(options.words)
     lines = serial_ports()
     documents = [_description(device) for device in devices] + [{"uri": "sim:", "simulated": True}]
-    console.result({"devices": documents, "serial_ports": list(lines)})
+    console.result(devices=documents, serial_ports=lines)
     rows = [
         [device.uri, device.info.model, device.info.serial, device.info.calibration.source]
         if device.info
@@ -93,16 +93,13 @@ def _probe(uri: str, console: Console) -> int:
     mean, noise = (wrench.mean(axis=0), wrench.std(axis=0, ddof=1)) if len(readings) > 1 else (None, None)
     units = ["N"] * 3 + ["N mm"] * 3
     console.result(
-        {
-            **identity(info),
-            "uri": uri,
-            "measured_rate": _measured_rate(readings),
-            "settings": dict(info.settings),
-            "health": asdict(health),
-            "mean": None if mean is None else mean.tolist(),
-            "noise": None if noise is None else noise.tolist(),
-            "units": units,
-        }
+        **identity(info) | {"uri": uri},
+        measured_rate=_measured_rate(readings),
+        settings=dict(info.settings),
+        health=asdict(health),
+        mean=None if mean is None else mean.tolist(),
+        noise=None if noise is None else noise.tolist(),
+        units=units,
     )
     console.say(f"{info.model}, serial {info.serial}, {number(info.rate, 4)} Hz set")
     console.say(f"calibration: {info.calibration.source}")

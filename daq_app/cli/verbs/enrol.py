@@ -81,14 +81,12 @@ def _write_labels(folder: Path, path: Path) -> None:
 def _show(study: Study, member: Member | None, console: Console) -> None:
     rows = [_row(study, entry) for entry in study.members.values()]
     console.result(
-        {
-            "study": study.name,
-            "protocol": study.protocol.name,
-            "blinded": study.key_sha256 is not None and not study.unblinded,
-            "rows": study.rows,
-            "subject": None if member is None else _row(study, member),
-            "subjects": rows,
-        }
+        study=study.name,
+        protocol=study.protocol.name,
+        blinded=study.key_sha256 is not None and not study.unblinded,
+        rows=study.rows,
+        subject=None if member is None else _row(study, member),
+        subjects=rows,
     )
     design = "random orders" if study.rows is None else f"a Williams design of {study.rows} rows"
     blind = "" if study.key_sha256 is None else ", unblinded" if study.unblinded else ", blinded"

@@ -33,7 +33,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     export(source, options.format, folder, lambda fraction: console.progress(fraction, f"writing {options.format}"))
     files = sorted(path for path in folder.rglob("*") if path.is_file())
     losses = list(recording.losses)
-    console.result({"folder": str(folder), "files": [str(path) for path in files], "losses": losses})
+    console.result(folder=str(folder), files=[str(path) for path in files], losses=losses)
     size = sum(path.stat().st_size for path in files) / 1e6
     console.say(
         recording.simulated_sentence, *losses, f"{folder}: {len(files)} file{'s' * (len(files) > 1)}, {size:.1f} MB"

@@ -81,15 +81,13 @@ def run(options: argparse.Namespace, console: Console) -> int:
     }
     shares = dict(zip(LAYERS, outcome.check.shares.tolist(), strict=True))
     console.result(
-        {
-            **({"simulated": "SIMULATED"} if simulated else {}),
-            **outcome.fit.to_dict(),
-            **({} if outcome.relaxation is None else {"relaxation": outcome.relaxation.to_dict()}),
-            "presses": list(curves.names),
-            "flaws": flaws,
-            "check": {"deviation": outcome.check.deviation, "shares": shares},
-            "assumed": assumptions,
-        }
+        **({"simulated": "SIMULATED"} if simulated else {}),
+        **outcome.fit.to_dict(),
+        **({} if outcome.relaxation is None else {"relaxation": outcome.relaxation.to_dict()}),
+        presses=curves.names,
+        flaws=flaws,
+        check={"deviation": outcome.check.deviation, "shares": shares},
+        assumed=assumptions,
     )
     console.say(simulated)
     _print(outcome, options, console)

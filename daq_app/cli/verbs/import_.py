@@ -69,7 +69,7 @@ def _restore_export(session: "ExportedSession", options: argparse.Namespace, con
     with _whole_session(folder):
         summary = import_session(session, folder)
         seal(folder)
-    console.result({"session": str(folder), "format": session.form, **asdict(summary)})
+    console.result(session=str(folder), format=session.form, **asdict(summary))
     outcome = "with the above" if summary.differences else "as they were"
     console.say(*summary.differences, f"{folder}: {summary.readings} readings, {summary.events} events, {outcome}")
     return FLAWED if summary.differences else DONE
@@ -98,7 +98,7 @@ def _import_foreign(options: argparse.Namespace, console: Console) -> int:
         seal(summary.folder)
         list_in_manifest(summary.folder, (ORIGINAL_FILE,))
     document = asdict(summary)
-    console.result({"session": str(document.pop("folder")), **document})
+    console.result(session=str(document.pop("folder")), **document)
     console.say(
         f"{summary.folder}: {summary.readings} readings at {number(summary.rate, 4)} per second",
         *(f"default: {default}" for default in summary.defaults),

@@ -75,7 +75,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     prediction = predict_session(recording, analysis, console, choices, afferent if options.afferent else None)
     seal = {"sealed_sha256": seal_prediction(recording, prediction.to_dict())} if options.seal else {}
     firing = {"afferent": firing_document(prediction, afferent)} if options.afferent else {}
-    console.result({**prediction.to_dict(), **seal, **firing})
+    console.result(**prediction.to_dict(), **seal, **firing)
     console.note(*other_signs(prediction.finger))
     console.say(recording.simulated_sentence)
     if not console.as_json:

@@ -55,17 +55,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
             items.append(PREDICTION)
     events = recording.events
     duration_s = (events[-1].time_ns - events[0].time_ns) * 1e-9 if events else 0.0
-    notes = list(_notes(recording))
-    console.result(
-        {
-            "session": str(options.session),
-            "compared": items,
-            "differences": differences,
-            "notes": notes,
-            "duration_s": duration_s,
-            "wall_s": wall_s,
-        }
-    )
+    notes, times = list(_notes(recording)), {"duration_s": duration_s, "wall_s": wall_s}
+    console.result(session=str(options.session), compared=items, differences=differences, notes=notes, **times)
     outcome = "identical" if not differences else "not identical, as named above"
     console.say(
         recording.simulated_sentence,

@@ -88,7 +88,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     else:
         page = options.out
         pages.write_report(report, page, drawings)
-    console.result({"page": str(page), "pictures": [str(path) for path in pictures], "flaws": len(report.flaws)})
+    console.result(page=str(page), pictures=[str(path) for path in pictures], flaws=len(report.flaws))
     console.say(f"{page}{' (SIMULATED)' if report.simulated else ''}")
     return FLAWED if analysis.flawed or unreadable else DONE
 

@@ -34,7 +34,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     recording = Recording.open(folder)
     if options.end:
         seal(folder)
-        console.result({"session": str(folder), "sealed": True, "readings": sum(map(len, recording.blocks()))})
+        console.result(session=str(folder), sealed=True, readings=sum(map(len, recording.blocks())))
         console.say(f"{folder}: sealed as it is")
         return DONE if recording.end is not None and recording.end.get("complete") else FLAWED
     factor = float(recording.provenance["clock"]["factor"])
@@ -46,6 +46,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
         outcome = attend_session(recorder, ResumeSession(str(folder.absolute()), options.device, people), console)
     end, folder = outcome.end, Path(outcome.folder)
     gap = next(event.data["gap"] for event in reversed(Recording.open(folder).events) if event.kind == "resumed")
-    console.result({"session": str(folder), "end": asdict(end), "sealed": outcome.sealed, "gap": gap})
+    console.result(session=str(folder), end=asdict(end), sealed=outcome.sealed, gap=gap)
     console.say(f"{folder}: {end.reason}; {end.readings} readings in all, {end.health.lost} lost since it was resumed")
     return outcome.exit_code

@@ -84,7 +84,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     end = outcome.end
     if Path(outcome.folder) != folder.absolute():  # the folder was removed during the session
         folder = Path(outcome.folder)
-    console.result({"session": str(folder), "end": asdict(end), "sealed": outcome.sealed, "seed": seed})
+    console.result(session=str(folder), end=asdict(end), sealed=outcome.sealed, seed=seed)
     console.say(f"{folder}: {end.reason}; {end.readings} readings, {end.health.lost} lost")
     if end.health.flagged:
         console.say(f"status of the readings: {flagged_words(end.health.flagged)}")

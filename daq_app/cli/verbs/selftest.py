@@ -59,7 +59,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     try:
         certificate = selftest(room, console.progress)
     except SelfTestFailed as failure:
-        console.result({"passed": False, "sentence": str(failure), "left_in": str(room)})
+        console.result(passed=False, sentence=str(failure), left_in=str(room))
         console.say(f"FAILED: {failure}. Its files are in {room}; report it")
         return FLAWED
     except KeyboardInterrupt:
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         raise
     shutil.rmtree(room)
     path = write_certificate(parent, certificate)
-    console.result({"passed": True, "certificate": str(path), "warning": warning, **certificate})
+    console.result(passed=True, certificate=str(path), warning=warning, **certificate)
     console.say(certificate["sentence"])
     console.note(None if warning is None else f"however, {warning}")
     console.say(f"certificate  {path}")

@@ -84,15 +84,13 @@ def run(options: argparse.Namespace, console: Console) -> int:
     doubtful = doubts(indices, samples)
     constant = constant_numbers(scene, design)
     console.result(
-        {
-            "samples": samples,
-            "seed": options.seed,
-            "design_origin": origin,
-            "sed_range": [low, high],
-            "indices": [asdict(index) for index in indices],
-            "doubts": doubtful,
-            "not_varied": constant,
-        }
+        samples=samples,
+        seed=options.seed,
+        design_origin=origin,
+        sed_range=[low, high],
+        indices=[asdict(index) for index in indices],
+        doubts=doubtful,
+        not_varied=constant,
     )
     console.say(
         f"SED from {number(low, 4, factor=1e3)} to {number(high, 4, factor=1e3)} kPa over {len(seds)} scenes; "
@@ -131,20 +129,18 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     indices = {name: sign_map.slope_indices(random, name, column_index, options.seed) for name in SERIES}
     without_answer = int(np.isnan(signs[:, column_index]).sum())
     console.result(
-        {
-            "quantity": options.quantity,
-            "kinematics": options.kinematics,
-            "quantities": _NAMES,
-            "changes": single,
-            "map": {"places": sign_map.PLACES, "radii": {f"{radius:g}": answer for radius, answer in radii.items()}},
-            "design": sign_map.DESIGN,
-            "samples": samples,
-            "seed": options.seed,
-            "fingers": len(random),
-            "without_answer": without_answer,
-            "shares": shares,
-            "indices": {name: [asdict(index) for index in sobol] for name, (sobol, _) in indices.items()},
-        }
+        quantity=options.quantity,
+        kinematics=options.kinematics,
+        quantities=_NAMES,
+        changes=single,
+        map={"places": sign_map.PLACES, "radii": {f"{radius:g}": answer for radius, answer in radii.items()}},
+        design=sign_map.DESIGN,
+        samples=samples,
+        seed=options.seed,
+        fingers=len(random),
+        without_answer=without_answer,
+        shares=shares,
+        indices={name: [asdict(index) for index in sobol] for name, (sobol, _) in indices.items()},
     )
     _print_changes(single, column_index, console)
     _print_map(radii, column_index, console)

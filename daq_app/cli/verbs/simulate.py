@@ -45,7 +45,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     timetable = None if options.script is None else load_timetable(options.script)
     box = serve(options.wire, **settings, seed=options.seed, factor=options.factor, timetable=timetable)
     try:
-        console.result({"address": box.uri, "simulated": True})
+        console.result(address=box.uri, simulated=True)
         console.say(f"SIMULATED {options.wire} at {box.uri}")
         console.note("serving until Ctrl-C")
         while True:

@@ -57,7 +57,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         with console.working("solving") as progress:
             prediction = solve(scene, progress, rough=rough_predictions.append)
     except SolveFailure as failure:
-        console.result(failure.to_dict())
+        console.result(**failure.to_dict())
         raise
     except KeyboardInterrupt:
         if not rough_predictions:
@@ -91,7 +91,7 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
     course = None if history is None else (course_numbers(history), course_errors(prediction))
     row_at = {} if row is None or deep is None else {"row_at": {"depth": deep.depth, **_row_in_json(row)}}
     plain = prediction.to_dict()
-    console.result({**plain, **row_at, **({} if course is None else _course_in_json(*course))})
+    console.result(**plain, **row_at, **({} if course is None else _course_in_json(*course)))
     console.say(title)
     best, corrected_error = number(prediction.sed_ending_corrected, 5, factor=1e3), _percent(plain["corrected_error"])
     corrected = ["corrected", best, "kPa", corrected_error]

@@ -70,7 +70,7 @@ def print_power(options: argparse.Namespace, console: Console) -> int:
     )
     recoveries = _recovery(options, effects, console)
     designs = [{**asdict(row), "power": row.share} for row in powers]
-    console.result({"planted": asdict(effects), "designs": designs, "recovery": msgspec.to_builtins(recoveries)})
+    console.result(planted=asdict(effects), designs=designs, recovery=msgspec.to_builtins(recoveries))
     rows = [
         [str(count), *(_share_text(row.share, row.studies) for row in powers if row.subjects == count)]
         for count in _SUBJECTS
@@ -216,7 +216,7 @@ def _pool(options: argparse.Namespace, folder: Path, output: Path, console: Cons
     console.progress(0.97, "writing the page")
     _write(study, folder.resolve().name, files)
     places = {content: str(path) for content, path in files.items()}
-    console.result({**places, "study": study.to_dict() | {"visits": [visit.session for visit in study.visits]}})
+    console.result(**places, study=study.to_dict() | {"visits": [visit.session for visit in study.visits]})
     _print(study, files, console)
     flawed = any(visit.losses or any(row.flaws for row in visit.rows) for visit in study.visits)
     return FLAWED if failures or flawed or study.misfits or not study.descriptors else DONE

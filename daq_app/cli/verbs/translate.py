@@ -52,7 +52,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         with name_failure(RecordingError, f"{options.out} cannot be written", new=True):
             write_whole(options.out, text.encode())
     destination = {"out": None, "text": text} if options.out is None else {"out": str(options.out)}
-    console.result({"language": options.language, "missing": gaps, **destination})
+    console.result(language=options.language, missing=gaps, **destination)
     unit = "texts" if options.program or options.window else "tables"
     console.note(f"{unit} yet to be translated: {gaps}" if gaps else "every text is translated")
     return DONE

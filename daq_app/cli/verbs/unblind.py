@@ -59,7 +59,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
             if not is_study_folder:
                 raise
             refusals.append(str(error))
-    console.result({"study": str(folder), "sessions": names, "left_out": refusals, "by": options.by, "utc": utc})
+    console.result(study=str(folder), sessions=names, left_out=refusals, by=options.by, utc=utc)
     console.say(f"unblinded by {options.by}: {', '.join(names) or 'the study alone'}", *refusals)
     if not is_study_folder:
         console.say("labels are the same throughout the study: anyone who saw this session's stimuli knows them all")

@@ -52,7 +52,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
             continue
         flaws += changes(name, document, fresh)
         checks.append(name)
-    console.result({"session": str(folder), "checked": checks, "problems": flaws})
+    console.result(session=str(folder), checked=checks, problems=flaws)
     outcome = "readable, with the above" if flaws else "whole"
     console.say(*flaws, f"{folder}: {outcome} ({', '.join(checks)} checked)")
     return FLAWED if flaws else DONE
