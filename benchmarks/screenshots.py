@@ -113,7 +113,7 @@ def score_reports(trial: int, score: float) -> tuple[m.Report, ...]:
 TARED = m.Tared((0.008, -0.007, -0.061, 1.2, -0.4, 0.02), (0.0041,) * 3 + (0.052,) * 3, (0.0,) * 6, 7000, 1.0)
 OPEN = (m.Device(INFO, FRAME), health(), TARED)
 SIMULATED = "SIMULATED transducer and hand"
-BEGINNING = (m.SessionBegun(FOLDER, PLAN, "simulated hand", SIMULATED, 0, 1.0), steps.AskBegin(), status(1))
+BEGINNING = (m.SessionBegun(FOLDER, PLAN, "simulated hand", SIMULATED, 0), steps.AskBegin(), status(1))
 ENDED = m.SessionEnded(FOLDER, SessionEnd("every trial is done", "finished", True, 900_000, Health()), False)
 CABLE_FAULT = "the transducer does not answer; check its power and the cable"
 LINK_LOSS = SessionEnd(CABLE_FAULT, "device", False, 90_000, Health(lost=12))

@@ -2,9 +2,9 @@
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from math import isfinite
+from math import floor, isfinite, log10
 from pathlib import Path
 from typing import TypeVar
 from xml.etree import ElementTree
@@ -114,6 +114,18 @@ def number(value: float | None, digits: int = 3, *, factor: float = 1.0) -> str:
     text = f"{abs(value):#.{digits}g}".rstrip(".")
     text = f"{abs(value):,.0f}" if 10.0**digits <= float(text) < 1e6 else text
     return f"−{text}" if value < 0.0 else text
+
+
+def step_above(value: float, steps: Sequence[float] = (1.0, 2.0, 5.0, 10.0)) -> float:
+    """Return the least of `steps` times a power of ten that is not below a value; 0 for none.
+
+    >>> step_above(0.3), step_above(5.1), step_above(0.013, (1.0, 1.5, 10.0)), step_above(-2.0)
+    (0.5, 10.0, 0.015, 0.0)
+    """
+    if not value > 0.0:
+        return 0.0
+    power = 10.0 ** floor(log10(value))
+    return float(f"{next(step * power for step in steps if step * power >= value * (1 - 1e-9)):.6g}")
 
 
 def aligned(count: int) -> str:

@@ -73,10 +73,8 @@ def _table_maker(
     """Return a function that makes a table with a line for each row of a type, each cell computed by its column."""
 
     def table(results: RunResults) -> Table:
-        rows = sorted(results.of(row_type), key=order)
-        return Table(
-            name, caption, tuple(columns), tuple(tuple(cell(row) for cell in columns.values()) for row in rows)
-        )
+        rows = (tuple(cell(row) for cell in columns.values()) for row in sorted(results.of(row_type), key=order))
+        return Table(name, caption, tuple(columns), tuple(rows))
 
     return table
 
@@ -101,12 +99,11 @@ def _estimates(results: RunResults) -> Table:
     rows = results.of(Estimate)
     cells: list[tuple[str, ...]] = []
     for kinematics, name in product(dict.fromkeys(row.kinematics for row in rows), GOALS):
-        group = [row for row in rows if row.kinematics == kinematics and row.number == name]
-        if group:
+        if group := [row for row in rows if row.kinematics == kinematics and row.number == name]:
             met = _share([row.meets_tolerance for row in group]) if name == TRUE_NUMBERS[0] else "–"
             ratios = [row.estimate / max(row.error, 1e-9) for row in group if row.above is not None]
-            ratio = number(median(ratios), 2) if ratios else "–"
             above, near = _share([row.above for row in group]), _share([row.near for row in group])
+            ratio = number(median(ratios) if ratios else None, 2)
             cells.append((f"{kinematics} strain", name, str(len(group)), above, near, met, ratio))
     caption = (
         "Estimates against true errors, of answers at a requested tolerance. Above: the estimate is at least the true "
@@ -132,7 +129,7 @@ def _hard(results: RunResults, kinematics: str) -> Table:
 
 
 def _ms(seconds: float | None) -> str:
-    return "–" if seconds is None else number(1e3 * seconds)
+    return number(seconds, factor=1e3)
 
 
 def _limit(value: float | None, unit: str) -> str:
@@ -153,7 +150,7 @@ _TABLES: tuple[Callable[[RunResults], Table], ...] = (
             "work": lambda row: row.work, "at error": lambda row: row.at_error,
             "reach": lambda row: _limit(row.reach, row.unit), "aim": lambda row: _limit(row.aim, row.unit),
             "measured": lambda row: "–" if row.measured is None else f"{number(row.measured)} {row.unit}",
-            "floors": lambda row: "–" if row.floors is None else number(row.floors, 2),
+            "floors": lambda row: number(row.floors, 2),
             "verdict": lambda row: row.verdict, "how": lambda row: row.how,
         },
     ),
@@ -312,12 +309,9 @@ def write(results: RunResults, folder: Path) -> tuple[Path, ...]:
     """Write page, pictures and data to `folder`; return the files. Raises ReportError if that fails."""
     data = folder / DATA
     swap_in(data, json.dumps(results.to_dict(), indent=1, allow_nan=False) + "\n")
-    paths = [data]
     figures = plates(results)
-    for plate in figures.values():
-        for panel in plate.panels:
-            path = folder / FIGURES / f"{panel.name}.svg"
-            swap_in(path, panel.svg)
-            paths.append(path)
-    swap_in(folder / PAGE, page(results, figures))
-    return (folder / PAGE, *paths)
+    texts = {folder / FIGURES / f"{panel.name}.svg": panel.svg for plate in figures.values() for panel in plate.panels}
+    texts[folder / PAGE] = page(results, figures)
+    for path, text in texts.items():
+        swap_in(path, text)
+    return (folder / PAGE, data, *list(texts)[:-1])

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from daq_app.wording import tr, tr_noop
+from daq_app.wording import step_above, tr, tr_noop
 from drivers.arrays import Array, Indices
 from solver.prediction import Skin, SkinLine
 from solver.quantities import FIELDS
@@ -83,18 +83,6 @@ class Film:
     frames: tuple[Frame, ...]
     instants: tuple[Instant, ...]
     lost: tuple[float, float] | None = None  # most compressed point of the last equilibrium [mm], without full slip
-
-
-def step_above(value: float) -> float:
-    """Return the smallest of `_STEPS` times a power of ten that is not below a value.
-
-    >>> step_above(0.013), step_above(0.5), step_above(0.0), step_above(9.0)
-    (0.015, 0.5, 1.0, 10.0)
-    """
-    if not value > 0.0:
-        return 1.0
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(next(step * power for step in _STEPS if step * power >= value * (1.0 - 1e-9)))
 
 
 def visible(nodes: Array, triangles: Indices, box: Box) -> Indices:
@@ -191,7 +179,7 @@ def automatic_range(field: FieldChoice, frames: Iterable[Frame]) -> Range:
         finite = values[np.isfinite(values)]
         if len(finite):
             tops.append(float(np.quantile(finite, _TOP)))
-    high = step_above(max(tops))
+    high = step_above(max(tops), _STEPS) or 1.0
     return (-high if field.signed else 0.0), high
 
 

@@ -75,8 +75,7 @@ class _Server:
         self._take()
         stops = [request for request in self._requests if isinstance(request, m.Stop)]
         if stops:
-            self._requests.clear()
-            self._requests.append(stops[0])
+            self._requests = deque(stops[:1])
         return any(isinstance(request, URGENT) for request in self._requests)
 
 
@@ -91,17 +90,14 @@ class Analyst:
     def poll(self) -> tuple[m.Reply, ...]:
         """Return the messages since the last call."""
         messages: list[m.Reply] = []
-        while self._child is not None:
-            try:
-                if (message := self._child.receive()) is None:
-                    break
+        try:
+            while self._child is not None and (message := self._child.receive()) is not None:
                 messages.append(message)
-            except (EOFError, OSError):
-                self.close()
-                if not messages or not isinstance(messages[-1], m.Problem):
-                    sentence = tr("The work ended unexpectedly; the next request restarts it.")
-                    messages.append(m.Problem(sentence))
-        if any(isinstance(message_, m.Cancelled) for message_ in messages):
+        except (EOFError, OSError):
+            self.close()
+            if not messages or not isinstance(messages[-1], m.Problem):
+                messages.append(m.Problem(tr("The work ended unexpectedly; the next request restarts it.")))
+        if any(isinstance(message, m.Cancelled) for message in messages):
             self._stop_time = None
         if self._stop_time is not None and time.monotonic() - self._stop_time > _PATIENCE:
             self.close()

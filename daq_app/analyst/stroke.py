@@ -22,6 +22,7 @@ EDGES: tuple[Edge, ...] = tr_noop(("onset", "steady begin", "steady end", "lift"
 _PLACES = tr_noop(("{name}/{file}, table blocks{rows}", "{name}/{file}, data sets readings/…{rows}"))  # live, sealed
 EDGE_DISTANCE = 0.02  # least distance between two edges [s]
 EDGE_STEP, EDGE_LEAP = 0.005, 0.05  # step of an edge by a key, and with Shift [s]
+# The kind of decision that moves an edge, which is also the name of that number of a stroke.
 EDGE_DECISIONS: dict[Edge, str] = {"onset": "onset", "steady begin": "steady", "steady end": "steady", "lift": "lift"}
 
 
@@ -122,9 +123,8 @@ def edges_of(stroke: StrokeFinding) -> tuple[EdgePosition, ...]:
     end = stroke.lift if stroke.lift is not None else begin + (0.0 if trace is None else float(trace.time[-1]))
     steady = stroke.steady or (begin + 0.35 * (end - begin), begin + 0.75 * (end - begin))
     times = dict(zip(EDGES, (begin, *steady, end), strict=True))
-    present = {"onset": stroke.onset is not None, "lift": stroke.lift is not None, "steady": stroke.steady is not None}
     return tuple(
-        EdgePosition(edge, times[edge], present[target], stroke.decided.get(target, ""))
+        EdgePosition(edge, times[edge], getattr(stroke, target) is not None, stroke.decided.get(target, ""))
         for edge, target in EDGE_DECISIONS.items()
     )
 
@@ -141,10 +141,9 @@ def clamp_edge(stroke: StrokeFinding, edge: Edge, time: float) -> float:
 def decision_of(stroke: StrokeFinding, edge: Edge, time: float, author: str, reason: str) -> Decision:
     """Return the decision that moves an edge."""
     target, new_time = EDGE_DECISIONS[edge], clamp_edge(stroke, edge, time)
-    old_value = {"onset": stroke.onset, "lift": stroke.lift, "steady": stroke.steady}[target]
     times = {position.edge: position.time for position in edges_of(stroke)} | {edge: new_time}
     value = (times["steady begin"], times["steady end"]) if target == "steady" else new_time
-    return Decision(author, reason, target, stroke.trial, stroke.within, old_value, value)
+    return Decision(author, reason, target, stroke.trial, stroke.within, getattr(stroke, target), value)
 
 
 def reversal(decisions: Decisions, author: str, *, redo: bool) -> Decision | None:

@@ -127,10 +127,8 @@ def by_cluster(
                 compatible.update(newcomers)
             last_worker_time = time.monotonic() if threads else last_worker_time
             if time.monotonic() - last_worker_time > WITHOUT_WORKERS:
-                raise SchedulerError(
-                    f"{address}: the scheduler has had no worker for {WITHOUT_WORKERS:.0f} s; start some and run this "
-                    "again: finished results are kept"
-                )
+                idle = f"{address}: the scheduler has had no worker for {WITHOUT_WORKERS:.0f} s"
+                raise SchedulerError(f"{idle}; start some and run this again: finished results are kept")
             # Files are read and sent as workers become free, so that memory never holds those of all sessions.
             while queue and threads and len(under_way) < 2 * threads:
                 name = queue.pop()

@@ -3,7 +3,7 @@
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal, Never, TextIO
 
@@ -25,7 +25,7 @@ _HELP = (
 )
 PAUSED = "The session is paused. Type resume to continue."
 KEYBOARD = "keyboard"
-_CHOICES: dict[float, Literal["first", "second"]] = {1.0: "first", 2.0: "second"}
+_CHOICES: dict[float | None, Literal["first", "second"] | None] = {1.0: "first", 2.0: "second", None: None}
 _WAYS = {1: "from proximal to distal (away from the subject)", -1: "from distal to proximal (towards the subject)"}
 
 
@@ -55,8 +55,7 @@ class Terminal:
 
     def show(self, command: steps.Command) -> None:
         """Print the instruction of a command, and remember its question."""
-        prompt = self._prompt_of(command)
-        if prompt is not None:
+        if (prompt := self._prompt_of(command)) is not None:
             self._prompt = prompt
             self._print(prompt.question)
             return
@@ -87,11 +86,8 @@ class Terminal:
             case steps.AskStroke(trial, allowed):
                 often = "once" if allowed == 1 else f"up to {allowed} times"
                 stroke = f"Stroke {often}, {_WAYS[trial.direction]}."
-                return (
-                    Prompt(stroke)
-                    if self._forces
-                    else Prompt(f"{stroke} Press Enter when it is done.", steps.StrokeDone())
-                )
+                with_key = Prompt(f"{stroke} Press Enter when it is done.", steps.StrokeDone())
+                return Prompt(stroke) if self._forces else with_key
             case steps.AskScore(_, (low, high), question=question):
                 text = f"{question} Score from 0 ({low}) to 100 ({high}):".strip()
                 return Prompt(text, answer=lambda number: steps.Scored(number, input_device=KEYBOARD))
@@ -117,14 +113,9 @@ class Terminal:
     def _parse(self, line: str) -> steps.Event | None:
         word, _, text = line.partition(" ")
         orders: dict[str, steps.Event] = {
-            "redo": steps.Redo(text),
-            "undo": steps.UndoRedo(),
-            "skip": steps.Skip(text),
-            "abort": steps.Abort(text),
-            "note": steps.Note(text),
-            "pause": steps.Pause(),
-            "resume": steps.Resume(),
-        }
+            "redo": steps.Redo(text), "skip": steps.Skip(text), "abort": steps.Abort(text), "note": steps.Note(text),
+            "undo": steps.UndoRedo(), "pause": steps.Pause(), "resume": steps.Resume(),
+        }  # fmt: skip
         if word == "abort" and not text.strip():  # it seals the session for good
             self._print("say why: abort needs a reason")
             return None
@@ -150,14 +141,15 @@ class Terminal:
 
 def _choice(number: float | None) -> steps.Event | None:
     """Return the event of choice 1, choice 2 or no answer (None); None for any other number."""
-    if number is not None and number not in _CHOICES:
-        return None
-    return steps.PairedChoice(None if number is None else _CHOICES[number], input_device=KEYBOARD)
+    return steps.PairedChoice(_CHOICES[number], input_device=KEYBOARD) if number in _CHOICES else None
 
 
 SILENCE = 3.0  # without a report from the recorder, before the terminal says so [s]
 _LOOK = 0.02  # between two polls of recorder, terminal and Ctrl-C [s]
-_WRONG = frozenset({"AddressError", "NotNow"})  # failures that are errors of the command line
+# Of a failure by the kind that the recorder names; others are RecordingError.
+_FAILURES: Mapping[str, type[Exception]] = {
+    "AddressError": WrongValue, "NotNow": WrongValue, "LinkLost": LinkLost, "SetupError": SetupError,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,14 +236,10 @@ class _Attendance:
     def _watch_silence(self) -> None:
         """Report once when the recorder stops answering, and once when it answers again."""
         running = self._start is not None and self._end is None  # it is silent while it starts or seals
-        silent = running and self._recorder.silence > SILENCE
-        if silent != self._silent:
-            self._silent = silent
-            self._console.note(
-                f"the recorder has not answered for {SILENCE:g} s: the computer is busy, or its disk does not answer"
-                if silent
-                else "the recorder answers again"
-            )
+        previous, self._silent = self._silent, running and self._recorder.silence > SILENCE
+        if self._silent != previous:
+            doubt = f"has not answered for {SILENCE:g} s: the computer is busy, or its disk does not answer"
+            self._console.note(f"the recorder {doubt if self._silent else 'answers again'}")
 
     def _take(self, report: m.Report) -> Outcome | None:
         """Take a report, and return the outcome if it is the last one."""
@@ -291,10 +279,6 @@ class _Attendance:
 
 def _raise_failure(report: m.Report) -> None:
     """Raise the failure in a report as the exception that the command line expects."""
-    match report:
-        case m.Failed(_, sentence, kind):
-            if kind in _WRONG:
-                raise WrongValue(sentence)
-            raise {"LinkLost": LinkLost, "SetupError": SetupError}.get(kind, RecordingError)(sentence)
-        case m.Gone(_, sentence):
-            raise RecordingError(sentence)
+    if isinstance(report, m.Failed | m.Gone):
+        kind = report.kind if isinstance(report, m.Failed) else ""
+        raise _FAILURES.get(kind, RecordingError)(report.sentence)

@@ -14,8 +14,7 @@ from daq_app.qt.layout import hbox, vbox
 from daq_app.qt.parts import button, choice, label
 from daq_app.qt.preferences import type_scale
 from daq_app.qt.tokens import GRID, MODEL, SMALL, TARGET, Tokens, font
-from daq_app.window.live_trace import scale_step
-from daq_app.wording import tr, tr_noop
+from daq_app.wording import step_above, tr, tr_noop
 from drivers.arrays import Array
 from solver.prediction import ROW
 
@@ -48,7 +47,7 @@ class RoomyAxis(pg.AxisItem):
         spacing = QFontMetricsF(self.style["tickFont"]).height() * (greatest - least) / size
         if not spacings or spacings[0][0] >= spacing:
             return spacings
-        return [(scale_step(spacing), 0.0)]
+        return [(step_above(spacing), 0.0)]
 
 
 def style_axis(axis: Any, tokens: Tokens, type_face: QFont) -> None:  # noqa: ANN401  pyqtgraph has no types

@@ -260,10 +260,5 @@ class _Tare:
         forces: list[Any] = [wrench[:, axis].tolist() for axis in range(3)]
         if len(stretch) < settings.baseline_readings or not all(is_quiet(force, settings) for force in forces):
             raise NotNow("the zero was not measured: something moved or touched; take hands off and zero again")
-        return Tared(
-            six(stretch.raw.mean(axis=0)),
-            six(stretch.raw.std(axis=0, ddof=1)),
-            six(wrench.std(axis=0, ddof=1)),
-            len(stretch),
-            float(stretch.time[-1] - stretch.time[0]),
-        )
+        mean, spread = six(stretch.raw.mean(axis=0)), six(stretch.raw.std(axis=0, ddof=1))
+        return Tared(mean, spread, len(stretch), float(stretch.time[-1] - stretch.time[0]))

@@ -134,7 +134,6 @@ class Tared(Struct, frozen=True):
 
     mean: Six  # raw units
     spread: Six  # standard deviation, raw units
-    noise: Six  # standard deviation [N, N mm]
     readings: int
     duration: float  # [s]
 
@@ -147,7 +146,6 @@ class SessionBegun(Struct, frozen=True):
     people: Kind
     simulated: str | None  # the sentence at the head of every file, if something is simulated
     clock_offset_ns: int  # session clock minus the machine's monotonic one [ns]; a simulated clock has no offset
-    factor: float  # session seconds in one real second [-]
     events: tuple[LoggedEvent, ...] = ()  # recorded earlier, in a resumed session
 
 

@@ -162,14 +162,14 @@ def run(prepared: SessionSetup, bench: Bench, display: Display, inbox: Inbox, se
     writer.safe = operator.take_safe
     simulated = simulated_sentence(prepared.info, prepared.people.kind != "people")
     folder, kind = str(writer.folder), prepared.people.kind
-    offset_ns, factor = prepared.clock_offset_ns, prepared.clock.factor
-    send(m.SessionBegun(folder, prepared.plan, kind, simulated, offset_ns, factor, prepared.earlier_events))
+    offset_ns = prepared.clock_offset_ns
+    send(m.SessionBegun(folder, prepared.plan, kind, simulated, offset_ns, prepared.earlier_events))
     with awake():
         end = run_session(
             prepared.plan,
             writer,
             operator,
-            bench.lend(prepared.clock_offset_ns) if prepared.plan.forces else None,
+            bench.lend(offset_ns) if prepared.plan.forces else None,
             resumed=prepared.continuation,
             stop=operator.stop,
             progress=send,

@@ -144,15 +144,9 @@ def simulated_study(parent: Path, seed: int, clock: Clock, console: Console) -> 
 
 DAMAGED = "S11"
 PEOPLE = SubjectSettings(
-    gain=0.75,
-    gain_spread=0.05,
-    offset_spread=3.0,
-    judgement_noise=4.0,
-    friction_weight=0.3,
-    drift=0.4,
-    carry_over=0.04,
-    moisture=0.08,
-)
+    gain=0.75, gain_spread=0.05, offset_spread=3.0, judgement_noise=4.0, friction_weight=0.3, drift=0.4,
+    carry_over=0.04, moisture=0.08,
+)  # fmt: skip
 CALIBRATION = 0.01  # standard deviation of each axis's gain about 1 [-]
 _LIGHT = 0.15  # peak normal force of a stroke that presses too lightly [N]
 _TICK = 0.1  # between two polls of the transducer [s of the session's clock]: five times the interval used with people
@@ -223,17 +217,12 @@ def _visit(parent: Path, seed: int, number: int, console: Console) -> list[dict[
     people = SyntheticPeople(person, clock, Connection(transducer, bench, transducer.now), session_plan, faults)
     study, run = [Setting("study seed", seed, "", "set")], RunnerSettings(tick=_TICK)
     conduct(session_plan, parent / subject, people, console, settings=study, run=run, durable=False)
-    return [
-        {
-            "subject": subject,
-            "trial": trial.number,
-            "descriptor": trial.stimulus.descriptor,
-            "index": trial.stimulus.index,
-            **{name: getattr(stroke, name) for name in ("mu", "tau_max", "speed", "direction")},
-            **people.true_judgement(trial),
-        }
-        for trial, stroke in zip(people.stroke_trials, bench.ground_truth(), strict=True)
-    ]
+    rows: list[dict[str, Any]] = []
+    for trial, stroke in zip(people.stroke_trials, bench.ground_truth(), strict=True):
+        stimulus = {"descriptor": trial.stimulus.descriptor, "index": trial.stimulus.index}
+        truth = {name: getattr(stroke, name) for name in ("mu", "tau_max", "speed", "direction")}
+        rows.append({"subject": subject, "trial": trial.number, **stimulus, **truth, **people.true_judgement(trial)})
+    return rows
 
 
 class SyntheticPeople(SimulatedPeople):

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.wording import step_above
 from drivers.arrays import Array, Indices
 
 CHANNELS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz", "N", "T", "mu", "speed", "x", "y")
 _LONGEST = 60.0  # longest trace [s]
 _GAP = 5.0  # time step, relative to the usual one, that counts as a gap even without lost readings [-]
-_STEPS = (1.0, 2.0, 5.0, 10.0)
 SCALE_MARGIN = 0.05  # margin drawn beyond the scale, relative to it [-]
 SHRINK = 0.25  # used share below which a scale shrinks [-] ...
 _PATIENCE = 20.0  # ... after this time [s]
@@ -183,16 +183,16 @@ class PlotScale:
             return self
         margin = SCALE_MARGIN * (self.high - self.low)
         if greatest > self.high + margin or least < self.low - margin:
-            low = self.low if least >= self.low - margin else -scale_step(-least)
-            high = self.high if greatest <= self.high + margin else scale_step(greatest)
+            low = self.low if least >= self.low - margin else -step_above(-least)
+            high = self.high if greatest <= self.high + margin else step_above(greatest)
             return PlotScale(low, high, self.least, now)
         wide = self.high - self.low > self.least
         if not wide or greatest > SHRINK * self.high or least < SHRINK * self.low:
             return PlotScale(self.low, self.high, self.least, now)
         if now - self.last_use < _PATIENCE:
             return self
-        low = 0.0 if self.low == 0.0 else -max(scale_step(-least), self.least / 2)
-        return PlotScale(low, max(scale_step(greatest), self.least if low == 0.0 else self.least / 2), self.least, now)
+        low = 0.0 if self.low == 0.0 else -max(step_above(-least), self.least / 2)
+        return PlotScale(low, max(step_above(greatest), self.least if low == 0.0 else self.least / 2), self.least, now)
 
 
 def ticks(low: float, high: float, room: float) -> tuple[float, ...]:
@@ -218,15 +218,3 @@ def times(seconds: float, room: float) -> tuple[float, ...]:
     steps = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
     step = next((step for step in steps if seconds / step + 1.0 <= min(room, 8.0)), seconds)
     return tuple(-step * n + 0.0 for n in range(int(seconds / step + 1e-9), -1, -1))
-
-
-def scale_step(value: float) -> float:
-    """Return the smallest step, 1, 2 or 5 times a power of ten, that is not below a value; 0 for none.
-
-    >>> scale_step(0.3), scale_step(5.1), scale_step(-2.0)
-    (0.5, 10.0, 0.0)
-    """
-    if value <= 0.0:
-        return 0.0
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(f"{next(step * power for step in _STEPS if step * power >= value * (1 - 1e-9)):.6g}")

@@ -135,7 +135,7 @@ def _fold_readings(bench: BenchState, message: Message) -> BenchState:
             return replace(bench, taring=True)
         case m.Failed("Tare"):
             return replace(bench, taring=False)
-        case m.Tared(mean, spread, _, readings, duration):
+        case m.Tared(mean, spread, readings, duration):
             return _set_zero(replace(bench, taring=False), mean, spread, readings, duration)
         case LoggedEvent(kind="zeroed", data=data):
             return _set_zero(bench, data["mean"], data["spread"], data["readings"], data["duration"])

@@ -101,9 +101,8 @@ def _fell(stroke: Stroke) -> float | None:
     """Return the relative fall of N from the first to the last quarter of the steady window; None without one."""
     if stroke.steady is None or stroke.curve is None:
         return None
-    inside = (stroke.curve.time >= stroke.steady[0]) & (stroke.curve.time <= stroke.steady[1])
-    normal = stroke.curve.normal[inside]
-    normal = normal[np.isfinite(normal)]
+    time, normal = stroke.curve.time, stroke.curve.normal
+    normal = normal[(time >= stroke.steady[0]) & (time <= stroke.steady[1]) & np.isfinite(normal)]
     if not len(normal):
         return None
     quarter = max(len(normal) // 4, 1)

@@ -248,7 +248,7 @@ def _pages(plan: SessionPlan, translate: Translate) -> Iterator[PreviewPage]:
     """Yield the pages of a session in the order of their first appearance, the page of its end last."""
     yield PreviewPage(tr("before the session"), subject_view(None, translate, plan.language))
     pages: dict[str, SubjectView] = {}
-    session: SessionState = begin_session(SessionBegun("", plan, "people", None, 0, 1.0), 0.0)
+    session: SessionState = begin_session(SessionBegun("", plan, "people", None, 0), 0.0)
     step = machine.start(plan)
     while not isinstance(step[0], states.Ended):
         state, commands = step

@@ -52,7 +52,7 @@ def status(safe_ns, state="mounting"):
     return Status(state, 1, 10, 100, 0, 2.0, Acknowledged(100, 3, safe_ns))
 
 
-BEGINNING = (m.Device(INFO, None), m.SessionBegun("recordings/P07", PLAN, "people", None, 0, 1.0), steps.AskBegin())
+BEGINNING = (m.Device(INFO, None), m.SessionBegun("recordings/P07", PLAN, "people", None, 0), steps.AskBegin())
 MOUNT = (*BEGINNING, steps.ShowInstruction(PLAN.blocks[0]), steps.AskMount(FIRST))
 TARE = (*MOUNT, steps.StartTake(1, 1), steps.MeasureZero())
 READY = (*TARE, steps.AskStroke(FIRST))

@@ -12,7 +12,7 @@ from drivers.transducer import Health, LinkLost, SetupError
 from sessions.recording import RecordingError
 from sessions.run.runner import SessionEnd
 
-BEGUN = m.SessionBegun("here", PLAN, "simulated people", None, 0, 1.0)
+BEGUN = m.SessionBegun("here", PLAN, "simulated people", None, 0)
 
 
 class ScriptedRecorder:

@@ -135,4 +135,3 @@ def test_a_tare_takes_as_long_a_stretch_as_was_asked_for_and_tells_its_mean_and_
     assert (tared.readings, tared.duration) == (65, 0.5)
     assert tared.mean == pytest.approx(raw.mean(axis=0))
     assert tared.spread == pytest.approx(raw.std(axis=0, ddof=1))
-    assert tared.noise == pytest.approx(raw.std(axis=0, ddof=1) * np.array([1e-6] * 3 + [1e-3] * 3))

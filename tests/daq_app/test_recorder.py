@@ -118,7 +118,7 @@ def test_the_bench_is_shown_before_and_after_a_session_with_its_own_zero(whole):
     assert {report.stream for report in desk.of(Live)} == {1, 2, 3}
     tare = desk.of(Tared)[0]
     assert tare.duration == pytest.approx(2.0, abs=0.006)  # a reading's step, by a counter good to 0.5 %
-    assert tare.noise[2] == pytest.approx(0.004, rel=0.4)  # simulated: 4 mN
+    assert tare.spread[2] == pytest.approx(4000, rel=0.4)  # simulated: 4 mN, in counts of 1 µN
     before = [report for report in desk.of(Live) if report.stream == 1 and report.zero == tare.mean]
     assert np.abs(np.concatenate([report.wrench[:, 2] for report in before])).max() < 0.05
 

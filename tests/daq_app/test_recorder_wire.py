@@ -51,7 +51,7 @@ REPORT_EXAMPLES = [
     Live(
         1, np.arange(3), np.arange(3.0), np.arange(3) * 7, np.arange(18.0).reshape(3, 6), np.zeros(3, int), SIX[:6], 4
     ),
-    SessionBegun("f", PLAN, "people", None, -5, 1.0, (LoggedEvent(1, 2**60, "zeroed", None, 3, {"mean": [0.1] * 6}),)),
+    SessionBegun("f", PLAN, "people", None, -5, (LoggedEvent(1, 2**60, "zeroed", None, 3, {"mean": [0.1] * 6}),)),
     AskScore(PLAN.trials[0], ("not at all", "very")),
     Failed("Tare", "no"),
 ]

@@ -35,8 +35,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if not console.as_json:
         _print(recording, analysis, console)
     console.say(*(f"* {decision.sentence}" for decision in analysis.decisions))
-    if analysis.tilt is not None:
-        console.say(_tilt_text(analysis.tilt, analysis.settings.tilt))
+    console.say(None if analysis.tilt is None else _tilt_text(analysis.tilt, analysis.settings.tilt))
     for flaw in analysis.flaws:
         prefix = "" if flaw.trial is None else f"trial {flaw.trial}: "
         console.say(f"{flaw.grade}: {prefix}{flaw.sentence}")
@@ -49,19 +48,13 @@ def _print(recording: Recording, analysis: Analysis, console: Console) -> None:
     from sessions.report import Further, numbers_alone
 
     report = numbers_alone(recording, analysis, None, Further())
-    rows = [
-        [
-            f"{stroke.number}{'*' if stroke.decided else ''}",
-            number(stroke.onset, 5),
-            number(stroke.lift, 5),
-            "–" if stroke.steady is None else f"{stroke.steady[0]:.2f} to {stroke.steady[1]:.2f}",
-        ]
-        for stroke in report.strokes
-    ]
-    console.say(
-        table(rows, header=["stroke", "onset [s]", "lift [s]", "steady [s]"]) if rows else no_strokes(recording.info)
-    )
-    console.say(*table_texts(report, "strokes"))
+    rows: list[list[str]] = []
+    for stroke in report.strokes:
+        steady = "–" if stroke.steady is None else f"{stroke.steady[0]:.2f} to {stroke.steady[1]:.2f}"
+        mark = "*" if stroke.decided else ""
+        rows.append([f"{stroke.number}{mark}", number(stroke.onset, 5), number(stroke.lift, 5), steady])
+    times = table(rows, header=["stroke", "onset [s]", "lift [s]", "steady [s]"])
+    console.say(times if rows else no_strokes(recording.info), *table_texts(report, "strokes"))
 
 
 def _tilt_text(tilt: Tilt, angles: tuple[float, float]) -> str:

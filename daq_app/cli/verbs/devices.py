@@ -101,15 +101,15 @@ def _probe(uri: str, console: Console) -> int:
         noise=None if noise is None else noise.tolist(),
         units=units,
     )
-    console.say(f"{info.model}, serial {info.serial}, {number(info.rate, 4)} Hz set")
-    console.say(f"calibration: {info.calibration.source}")
-    console.say(f"measured {number(_measured_rate(readings), 5)} Hz on the session's clock")
     counts = ", ".join(f"{label} {getattr(health, name)}" for name, label in COUNT_LABELS.items())
-    console.say(f"{counts}, lag {health.lag_ms:.1f} ms")
-    if health.flagged:
-        console.say(f"status of the readings: {flagged_words(health.flagged)}")
-    if health.rate_words:
-        console.say(health.rate_words)
+    console.say(
+        f"{info.model}, serial {info.serial}, {number(info.rate, 4)} Hz set",
+        f"calibration: {info.calibration.source}",
+        f"measured {number(_measured_rate(readings), 5)} Hz on the session's clock",
+        f"{counts}, lag {health.lag_ms:.1f} ms",
+        f"status of the readings: {flagged_words(health.flagged)}" if health.flagged else None,
+        health.rate_words or None,
+    )
     if mean is not None and noise is not None:
         columns = zip(AXES, mean.tolist(), noise.tolist(), units, strict=True)
         rows = [[axis, number(mean_value), number(sd, 2), unit] for axis, mean_value, sd, unit in columns]

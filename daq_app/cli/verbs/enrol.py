@@ -6,6 +6,7 @@ A study is a folder. --protocol makes it, and fixes its protocol; --blind hides 
 
 import argparse
 import secrets
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -97,15 +98,7 @@ def _show(study: Study, member: Member | None, console: Console) -> None:
 
 def _row(study: Study, member: Member) -> dict[str, Any]:
     body = member.body
-    measures = {
-        "tip_radius": body.finger.tip_radius,
-        "width": body.finger.width,
-        "contact_angle": body.contact_angle,
-        **{f"depth of {block}": depth for block, depth in body.indentations.items()},
-    }
-    return {
-        "subject": member.subject,
-        "row": study.row(member.slot),
-        "own": ", ".join(f"{name} {value:g}" for name, value in measures.items() if value is not None),
-        "withdrawn": member.withdrawn,
-    }
+    measures = {**asdict(body.finger), "contact_angle": body.contact_angle}
+    measures |= {f"depth of {block}": depth for block, depth in body.indentations.items()}
+    own = ", ".join(f"{name} {value:g}" for name, value in measures.items() if value is not None)
+    return {"subject": member.subject, "row": study.row(member.slot), "own": own, "withdrawn": member.withdrawn}

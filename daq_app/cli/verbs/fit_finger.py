@@ -72,13 +72,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.scene is not None:
         mark = f"# {simulated}\n" if simulated else ""
         write_whole(options.scene, f"{mark}{SCENE_HEAD}\n{toml_text(outcome.scene)}".encode())
-    assumptions = {
-        "mu": options.mu,
-        "prior_factor": options.prior,
-        "calibration_error": settings.gain_uncertainty,
-        "width": outcome.scene.finger.width,
-        "seed": options.seed,
-    }
+    assumed = {"mu": options.mu, "prior_factor": options.prior, "calibration_error": settings.gain_uncertainty}
     shares = dict(zip(LAYERS, outcome.check.shares.tolist(), strict=True))
     console.result(
         **({"simulated": "SIMULATED"} if simulated else {}),
@@ -87,7 +81,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         presses=curves.names,
         flaws=flaws,
         check={"deviation": outcome.check.deviation, "shares": shares},
-        assumed=assumptions,
+        assumed=assumed | {"width": outcome.scene.finger.width, "seed": options.seed},
     )
     console.say(simulated)
     _print(outcome, options, console)
@@ -124,12 +118,11 @@ def _curves(options: argparse.Namespace, recording: Recording, settings: Analysi
 def _relaxation_flaws(curves: PressCurves) -> list[str]:
     """Return a flaw for relaxation in a hold, which distorts the curve of force over depth."""
     fall = max((hold.fall for hold in curves.holds if hold is not None), default=0.0)
-    if fall <= FALL:
-        return []
-    return [
+    flaw = (
         f"The force falls by {100.0 * fall:.0f} % while the stage holds: the finger relaxes, which distorts the force "
         "on the way down too, and layers are off by more than their intervals; use --relaxation."
-    ]
+    )
+    return [flaw] if fall > FALL else []
 
 
 def _fit(
@@ -159,9 +152,7 @@ def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> 
         [
             layer.name,
             number(layer.stiffness.value, factor=1e3),
-            _interval_text(layer.stiffness),
-            _interval_text(layer.profile),
-            _interval_text(layer.prior),
+            *map(_interval_text, (layer.stiffness, layer.profile, layer.prior)),
             f"{100 * share:.0f} %",
         ]
         for layer, share in zip(finger_fit.layers, solver_check.shares, strict=True)

@@ -39,8 +39,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     from sessions.exchange.exported import read_export
 
-    session = read_export(options.file)
-    return _import_foreign(options, console) if session is None else _restore_export(session, options, console)
+    session, folder = read_export(options.file), options.out or Path("recordings") / options.file.stem
+    if session is None:
+        return _import_foreign(folder, options, console)
+    return _restore_export(session, folder, options, console)
 
 
 @contextmanager
@@ -58,14 +60,13 @@ def _whole_session(folder: Path) -> Generator[None]:
         ) from error
 
 
-def _restore_export(session: "ExportedSession", options: argparse.Namespace, console: Console) -> int:
+def _restore_export(session: "ExportedSession", folder: Path, options: argparse.Namespace, console: Console) -> int:
     from sessions.exchange.exported import import_session
     from sessions.recording.archive import seal
 
     names = [name for name in _OF_FOREIGN if getattr(options, name) not in (None, False)]
     if names:
         raise WrongValue(f"--{names[0]} does not apply to an export, which already says it: leave it out")
-    folder = options.out or Path("recordings") / options.file.stem
     with _whole_session(folder):
         summary = import_session(session, folder)
         seal(folder)
@@ -75,7 +76,7 @@ def _restore_export(session: "ExportedSession", options: argparse.Namespace, con
     return FLAWED if summary.differences else DONE
 
 
-def _import_foreign(options: argparse.Namespace, console: Console) -> int:
+def _import_foreign(folder: Path, options: argparse.Namespace, console: Console) -> int:
     from sessions.exchange.import_csv import ORIGINAL_FILE, ImportOptions, import_csv
     from sessions.recording.archive import seal
     from sessions.recording.manifest import list_in_manifest
@@ -86,13 +87,9 @@ def _import_foreign(options: argparse.Namespace, console: Console) -> int:
     import_options = ImportOptions(
         units=None if units is None else (units[0], units[-1]),
         axes=_names(options.axes),
-        normal=options.normal,
-        height=options.height,
-        rate=options.rate,
-        zeroed=options.zeroed,
         subject=options.subject or "unknown",
+        **{name: getattr(options, name) for name in ("normal", "height", "rate", "zeroed")},
     )
-    folder = options.out or Path("recordings") / options.file.stem
     with _whole_session(folder):
         summary = import_csv(options.file, folder, import_options)
         seal(summary.folder)

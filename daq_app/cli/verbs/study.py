@@ -76,11 +76,11 @@ def print_power(options: argparse.Namespace, console: Console) -> int:
         for count in _SUBJECTS
     ]
     values = ", ".join(f"{name} = {value:g}" for name, value in asdict(effects).items())
-    console.say(f"Assumed: {values}. We chose the default values; nobody measured them.")
-    console.say(table(rows, header=["subjects", *(f"{count} surfaces" for count in SURFACES)]))
     console.say(
+        f"Assumed: {values}. We chose the default values; nobody measured them.",
+        table(rows, header=["subjects", *(f"{count} surfaces" for count in SURFACES)]),
         "Share of simulated studies whose correlation within subjects has p < 0.05 for other people on the same "
-        f"surfaces, of {options.studies} each. They hold for these surfaces, not for others."
+        f"surfaces, of {options.studies} each. They hold for these surfaces, not for others.",
     )
     if recoveries:
         _print_recovery(recoveries, options, console)
@@ -110,13 +110,10 @@ def _print_recovery(recoveries: Sequence[Recovery], options: argparse.Namespace,
     label = BY_NAME[options.quantity].label
     depths = ", ".join(f"{depth:g}" for depth in options.depths)
     console.say(f"Scores that follow {label} with that effect over its range, surfaces pressed to {depths} mm:")
-    rows = [
-        [
-            f"{design.people} × {design.surfaces} × {len(design.depths)}",
-            *(_share_text(share, design.studies) for share in (design.preferred, design.family)),
-        ]
-        for design in recoveries
-    ]
+    rows: list[list[str]] = []
+    for design in recoveries:
+        preferred, family = (_share_text(share, design.studies) for share in (design.preferred, design.family))
+        rows.append([f"{design.people} × {design.surfaces} × {len(design.depths)}", preferred, family])
     console.say(table(rows, header=["subjects × surfaces × depths", "preferred", "it or a twin"]))
     twins = ", ".join(recoveries[-1].twins) or "none"
     console.say(
@@ -237,15 +234,8 @@ def _files(output: Path, options: VisitOptions) -> dict[str, Path]:
     """Return the output files by content. Raises ReportError, and NotOurs if one would replace a foreign file."""
     from sessions.report import pages  # drawing is slow to load
 
-    names = {
-        "page": "study.html",
-        "table": pages.TRIALS,
-        "columns": pages.TRIAL_COLUMNS,
-        "numbers": "study.json",
-        "rivals": "rivals.csv",
-    }
-    if options.paths != "none":
-        names["paths"] = "paths.csv"
+    names = {"page": "study.html", "table": pages.TRIALS, "columns": pages.TRIAL_COLUMNS, "numbers": "study.json"}
+    names |= {"rivals": "rivals.csv"} | ({} if options.paths == "none" else {"paths": "paths.csv"})
     files = {content: output / name for content, name in names.items()}
     pages.check_place(*files.values())
     return files

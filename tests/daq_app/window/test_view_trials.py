@@ -90,7 +90,7 @@ def test_a_trial_without_a_stroke_says_why(messages, number, why):
 
 def test_a_protocol_that_keeps_forces_from_the_experimenter_shows_no_stroke():
     blind = replace(PLAN, shown=Visibility(experimenter=()))
-    beginning = m.SessionBegun("recordings/P07", blind, "people", None, 0, 1.0)
+    beginning = m.SessionBegun("recordings/P07", blind, "people", None, 0)
     quality = Judged(1, 1, replace(GOOD, stroke=STROKE))
     view = inspection(after(BEGINNING[0], beginning, *TARE[2:], quality, *TAKE_KEPT).session, 1)
     assert view.verdict == "Forces are not shown in this protocol."

@@ -116,7 +116,7 @@ def test_no_mark_of_an_ended_session_is_drawn_on_the_clock_of_the_next_stream():
 def test_the_recording_clock_of_a_session_that_goes_on_says_the_time_since_the_session_began():
     before = (replace(log("started"), time_ns=40_000_000_000), replace(log("pause"), time_ns=52_000_000_000))
     # The session's clock was at 40 s when the session began, and is at 100 + 600 s as it goes on.
-    beginning = m.SessionBegun("recordings/P07", PLAN, "people", None, 600_000_000_000, 1.0, before)
+    beginning = m.SessionBegun("recordings/P07", PLAN, "people", None, 600_000_000_000, before)
     state = after(Tick(100.0), m.Device(INFO, None), beginning, status(1_000), Tick(101.0))
     assert derive_view(state).lamp.text == "recording 00:11:01"
     assert derive_view(state).course.timer == "0:01"
@@ -124,7 +124,7 @@ def test_the_recording_clock_of_a_session_that_goes_on_says_the_time_since_the_s
 
 def test_a_session_that_goes_on_begins_without_the_marks_of_the_stream_before():
     before = (log("take_started", 1, take=1), log("contact_onset", 1, time=1.5, noticed=1.51))
-    beginning = m.SessionBegun("recordings/P07", PLAN, "people", None, 0, 1.0, before)
+    beginning = m.SessionBegun("recordings/P07", PLAN, "people", None, 0, before)
     assert after(m.Device(INFO, None), beginning).session.marks == ()
 
 
@@ -181,7 +181,7 @@ def test_redo_names_the_trial_it_discards(messages, trial):
 
 def test_redo_names_both_of_two_that_are_compared():
     first, second = PAIRS.trials[:2]
-    beginning = m.SessionBegun("recordings/P07", PAIRS, "people", None, 0, 1.0)
+    beginning = m.SessionBegun("recordings/P07", PAIRS, "people", None, 0)
     state = after(beginning, steps.AskMount(second), steps.StartTake(2, 1), steps.AskChoice(first, second, "Which?"))
     redo = derive_view(state).course.buttons["redo"]
     assert redo.label == "Redo 1–2"

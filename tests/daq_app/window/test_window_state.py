@@ -322,7 +322,7 @@ def test_the_bench_tells_what_a_serial_number_has_been_through():
 
 
 def test_a_tare_shows_its_figures_in_newtons_and_how_far_the_zero_has_moved_since_the_first():
-    first = m.Tared((8e3, -7e3, -1e3, 0.0, 0.0, 0.0), (4e3,) * 3 + (50.0,) * 3, (0.0,) * 6, 200, 1.0)
+    first = m.Tared((8e3, -7e3, -1e3, 0.0, 0.0, 0.0), (4e3,) * 3 + (50.0,) * 3, 200, 1.0)
     bench = derive_view(after(m.Device(INFO, None), first)).bench
     assert bench.tare == "Fx 8, Fy −7, Fz −1 mN\nTx 0.0, Ty 0.0, Tz 0.0 N mm\nover 1.0 s, n = 200"
     assert bench.drift == "first zero"
@@ -381,7 +381,7 @@ def test_a_session_that_goes_on_shows_what_was_done_before():
         log("take_started", 2, take=1),
         log("take_discarded", 2, take=1, reason="cut short"),
     )
-    beginning = m.SessionBegun("recordings/P07", PLAN, "people", None, 0, 1.0, before)
+    beginning = m.SessionBegun("recordings/P07", PLAN, "people", None, 0, before)
     rows = derive_view(after(m.Device(INFO, None), beginning, steps.AskMount(SECOND))).course.rows
     assert [row.kind for row in rows[:4]] == ["block", "done", "current", "coming"]
     assert rows[1].outcome == "score 40"
