@@ -172,7 +172,7 @@ class NetFtBox(ServedBox):
         if command == 0x0000:
             self._stream = None
         elif command in starts and pages.streams:
-            size = pages.buffered if command == 0x0003 else 1
+            size = pages.numbers["comrdtbsiz"] if command == 0x0003 else 1
             tick = (self._inside.tick(now) // pages.step + 1) * pages.step  # the same ticks at any instant of asking
             self._stream = _Stream(asker, tick, self._first_record, count or None, size)
             self._first_record = 1

@@ -3,7 +3,9 @@
 Layouts are from the maker's manual 9620-05-NET FT (chapters 9 to 11), packed here only.
 """
 
+import contextlib
 import struct
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from urllib.parse import parse_qsl, urlsplit
 from xml.sax.saxutils import escape
@@ -32,11 +34,13 @@ _TORQUES = {  # code: name, newton millimetres
     5: ("kg-cm", 98.0665),
     6: ("kN-m", 1_000_000.0),
 }
-_SETTABLE = {  # page: variables it accepts
-    "/setting.cgi": {"setcfgsel", "setuserfilter", "setpke", *(f"setbias{i}" for i in range(6))},
-    "/config.cgi": {"cfgid", "cfgnam", "cfgfu", "cfgtu"},
-    "/comm.cgi": {"comrdte", "comrdtrate", "comrdtbsiz"},
+_SETTABLE: Mapping[str, Mapping[str, Container[int]]] = {  # page: integers that its variables accept
+    "/setting.cgi": {name: range(13) for name in ("setuserfilter", "setpke")}
+    | {f"setbias{i}": range(-32768, 32768) for i in range(6)},
+    "/config.cgi": {"cfgfu": _FORCES, "cfgtu": _TORQUES},
+    "/comm.cgi": {"comrdtrate": range(1, 7813), "comrdtbsiz": range(1, 41)},  # no rate above the product's own
 }
+_TEXTS = {"/config.cgi": ("cfgid", "cfgnam"), "/comm.cgi": ("comrdte",)}  # variables that are text
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,20 +64,25 @@ class Pages:
         self.product = product
         self._serial = serial
         self._rated = rated  # (6,) [N, N mm]
-        self._values = {"setuserfilter": "0", "setpke": "0", "cfgnam": "Nano43 SI-36-0.5", "cfgid": "default"}
-        self._bias = [0] * 6
+        self._texts = {"cfgnam": "Nano43 SI-36-0.5", "cfgid": "default", "comrdte": "Enabled"}
+        self.numbers = {"setuserfilter": 0, "setpke": 0, "cfgfu": 2, "cfgtu": 3, "comrdtrate": rate, "comrdtbsiz": 10}
+        self.numbers |= {f"setbias{i}": 0 for i in range(6)}
         self.count_factor = 1.0  # factor of the counts per unit
-        self.force_code = 2
-        self.torque_code = 3
-        self.buffered = 10  # records in a datagram of buffered streaming
-        self.streams = True
-        self.step = 1
-        self._set_rate(rate)
+
+    @property
+    def streams(self) -> bool:
+        """Whether it streams on request."""
+        return self._texts["comrdte"] in ("1", "Enabled")
+
+    @property
+    def step(self) -> int:
+        """Ticks from record to record: of the rate that is set, or of the next higher one that divides the ticks."""
+        return int(self.product.ticks // self.numbers["comrdtrate"])
 
     @property
     def counts_per_wrench(self) -> Array:
         """Counts in one N or N mm of each axis, shape (6,), by the units, without `count_factor`."""
-        return _COUNTS / np.repeat([_FORCES[self.force_code][1], _TORQUES[self.torque_code][1]], 3)
+        return _COUNTS / np.repeat([_FORCES[self.numbers["cfgfu"]][1], _TORQUES[self.numbers["cfgtu"]][1]], 3)
 
     @property
     def scales(self) -> list[int]:
@@ -94,13 +103,17 @@ class Pages:
         if url.path == "/netftcalapi.xml":
             return 200, _page("netftCalibration", {"calsn": self._serial, "calcpf": self.counts, "calcpt": self.counts})
         if url.path in _SETTABLE:
-            for name in _SETTABLE[url.path] & query.keys():
-                self._set(name, query[name])
+            self._texts |= {name: query[name] for name in _TEXTS.get(url.path, ()) if name in query}
+            for name, allowed in _SETTABLE[url.path].items():
+                with contextlib.suppress(KeyError, ValueError):  # an invalid number is ignored, as in the real box
+                    number = int(query[name])
+                    if number in allowed and (name != "comrdtrate" or number <= self.product.ticks):
+                        self.numbers[name] = number
             return 302, ""
         return 404, ""
 
     def _configuration(self, status: int, counts: list[int]) -> str:
-        force, torque = _FORCES[self.force_code], _TORQUES[self.torque_code]
+        force, torque = _FORCES[self.numbers["cfgfu"]], _TORQUES[self.numbers["cfgtu"]]
         rated = self._rated / np.repeat([force[1], torque[1]], 3)
         elements = {
             "prodname": self.product.name,
@@ -108,19 +121,19 @@ class Pages:
             "runstat": f"0x{status:08x}",
             "runft": _join(counts),
             "runsg": _join([0] * 6),
-            "setbias": _join(self._bias),
-            "setuserfilter": self._values["setuserfilter"],
-            "setpke": self._values["setpke"],
+            "setbias": _join([self.numbers[f"setbias{i}"] for i in range(6)]),
+            "setuserfilter": self.numbers["setuserfilter"],
+            "setpke": self.numbers["setpke"],
             "setmce": 0,
             "setcfgsel": 0,
             "setrate": int(self.product.ticks),
-            "cfgid": self._values["cfgid"],
-            "cfgnam": self._values["cfgnam"],
+            "cfgid": self._texts["cfgid"],
+            "cfgnam": self._texts["cfgnam"],
             "cfgcalsel": 0,
             "cfgcalsn": self._serial,
-            "cfgfu": self.force_code,
+            "cfgfu": self.numbers["cfgfu"],
             "scfgfu": force[0],
-            "cfgtu": self.torque_code,
+            "cfgtu": self.numbers["cfgtu"],
             "scfgtu": torque[0],
             "cfgcpf": self.counts,
             "cfgcpt": self.counts,
@@ -132,40 +145,11 @@ class Pages:
             "cfgtfx": _join([0] * 6),
             "comrdte": "Enabled" if self.streams else "Disabled",
             "comrdtrate": int(self.product.ticks / self.step),
-            "comrdtbsiz": self.buffered,
+            "comrdtbsiz": self.numbers["comrdtbsiz"],
         }
         if self.product.converter:
             elements["setadcrate"] = self.product.converter
         return _page("netft", elements)
-
-    def _set(self, name: str, text: str) -> None:
-        """Set one value; an invalid one is ignored, as in the real box."""
-        if name in ("cfgid", "cfgnam"):
-            self._values[name] = text
-            return
-        if name == "comrdte":
-            self.streams = text in ("1", "Enabled")
-            return
-        try:
-            value = int(text)
-        except ValueError:
-            return
-        if name == "comrdtrate" and 1 <= value <= self.product.ticks:
-            self._set_rate(value)
-        elif name == "comrdtbsiz" and 1 <= value <= 40:
-            self.buffered = value
-        elif name == "cfgfu" and value in _FORCES:
-            self.force_code = value
-        elif name == "cfgtu" and value in _TORQUES:
-            self.torque_code = value
-        elif name.startswith("setbias") and -32768 <= value <= 32767:
-            self._bias[int(name[-1])] = value
-        elif name in self._values and 0 <= value <= 12:
-            self._values[name] = text
-
-    def _set_rate(self, rate: int) -> None:
-        """Set the step in ticks, for `rate` readings a second or the next higher rate that divides the ticks."""
-        self.step = int(self.product.ticks // rate)
 
 
 def _join(values: list[int] | list[str]) -> str:
@@ -245,7 +229,7 @@ class Electronics:
             small = np.clip(np.rint(counts[0] / np.array(self.pages.scales)), -32768, 32767).astype(int).tolist()
             return struct.pack(">HH6h", 0x1234, status[0] >> 16, *small)
         if request[0] == 1:  # READCALINFO
-            units = (self.pages.force_code, self.pages.torque_code)
+            units = (self.pages.numbers["cfgfu"], self.pages.numbers["cfgtu"])
             return struct.pack(">HBBII6H", 0x1234, *units, self.pages.counts, self.pages.counts, *self.pages.scales)
         return b""
 
