@@ -55,10 +55,8 @@ class DigitalFtBox(LineBox):
         self._deaf_until = 0.0
         self._streaming_since = 0.0 if streaming else None
 
-    @property
-    def uri(self) -> str:
-        """Its address, known once it is started. Pseudo-terminals have no parity."""
-        return f"digital-ft://{self.path}?parity=none"
+    def address(self, path: str) -> str:
+        return f"digital-ft://{path}?parity=none"  # pseudo-terminals have no parity
 
     def _calibration(self) -> bytes:
         serial = self._bench.serial.encode()[:8]

@@ -7,6 +7,7 @@ import errno
 import threading
 import time
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -320,11 +321,9 @@ def _start(bench: Bench, clock: Clock, faults: Faults, folder: Path) -> RunningS
     box = LabJackU6Box(bench, clock, faults=faults)
     bus = usb_link.BACKEND = SimulatedBus([box])
     uri = f"labjack-u6://?rate=300&cal={calibration_file(folder, bench.serial)}"
-
-    def forget() -> None:
-        usb_link.BACKEND = None
-
-    return RunningSimulator(uri, bench, box.now, unplug(faults), bus.claims, forget)
+    return RunningSimulator(
+        uri, bench, box.now, unplug(faults), bus.claims, forget=partial(setattr, usb_link, "BACKEND", None)
+    )
 
 
 SIMULATOR = Simulator("labjack-u6", _start, factor=2.0, statuses=(54, 55, 63), on_ports=False)  # codes in a stream

@@ -67,10 +67,8 @@ class NetFtBox(ServedBox):
         self._stream: _Stream | None = None
         self._selector = selectors.SelectSelector()  # with waits finer than a millisecond
         self._sockets: list[socket.socket] = []
-        self.uri = ""  # its address, known once it is started
 
     def start(self) -> None:
-        """Open the ports and begin to serve. Raises SetupError when a port is in use."""
         with contextlib.ExitStack() as stack:  # closes the open ports where one fails
             self._sockets = [stack.enter_context(_open_port(*address)) for address in self._addresses]
             stack.pop_all()

@@ -40,12 +40,10 @@ class SerialFtBox(LineBox):
         self._counts = np.repeat([COUNTS_PER_N, COUNTS_PER_NM / 1000.0], 3)  # per N or N mm
         self.power_up(0.0)
 
-    @property
-    def uri(self) -> str:
-        """Its address, known once it is started."""
+    def address(self, path: str) -> str:
         force, torque = self._rated[0], self._rated[3] / 1000.0
         return (
-            f"serial-ft://{self.path}?baud={self._baud}&counts_per_N={COUNTS_PER_N:g}"
+            f"serial-ft://{path}?baud={self._baud}&counts_per_N={COUNTS_PER_N:g}"
             f"&counts_per_Nm={COUNTS_PER_NM:g}&range_N={force:g}&range_Nm={torque:g}"
             f"&serial={self._bench.serial}&simulated=1"
         )

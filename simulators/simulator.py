@@ -10,7 +10,6 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from drivers.clock import Clock
 from drivers.transducer import SetupError
@@ -124,6 +123,7 @@ def stopwatch(clock: Clock) -> Callable[[], float]:
 class ServedBox:
     """One box. Its time and the bench's begin when it is started."""
 
+    uri: str  # its address; from `start` on
     now: Callable[[], float]  # [s]; from `serve` on
 
     def __init__(self, clock: Clock, faults: Faults | None) -> None:
@@ -131,6 +131,10 @@ class ServedBox:
         self.faults = faults or Faults()
         self.closing = threading.Event()
         self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Open the ports and begin to serve. Raises SetupError where that is not possible."""
+        raise NotImplementedError
 
     def serve(self, work: Callable[[], None], name: str) -> None:
         """Start the time, and a thread that works until `closing` is set."""
@@ -160,15 +164,9 @@ class LineBox(ServedBox):
         self._name = name
         self._port: PseudoTerminal | None = None
 
-    @property
-    def path(self) -> str:
-        """Path of the port; known once the box is started."""
-        assert self._port is not None
-        return self._port.path
-
     def start(self) -> None:
-        """Create the port and begin to serve. Raises SetupError without pseudo-terminals."""
         port = self._port = PseudoTerminal(self._name)
+        self.uri = self.address(port.path)
         self.serve(lambda: self._serve(port), self._name)
 
     def close(self) -> None:
@@ -192,6 +190,10 @@ class LineBox(ServedBox):
             if not self.is_on:
                 self.power_up(now)
             self.work(port, now)
+
+    def address(self, path: str) -> str:
+        """Return the address of a box whose port has this path."""
+        raise NotImplementedError
 
     def power_up(self, now: float) -> None:
         """Reset everything that is lost at power-off; the box is then on."""
@@ -235,18 +237,7 @@ class Simulator:
     at_start: bool = False  # a status is sent in full only if set when a stream begins
 
 
-class _Box(Protocol):
-    @property
-    def uri(self) -> str: ...
-
-    def now(self) -> float: ...
-
-    def start(self) -> None: ...
-
-    def close(self) -> None: ...
-
-
-def serve_on_ports(make: Callable[..., _Box]) -> Start:
+def serve_on_ports(make: Callable[..., ServedBox]) -> Start:
     """Return the start function of a box with its own ports; `make` takes bench, clock, `faults` and settings."""
 
     def start(bench: Bench, clock: Clock, faults: Faults, _: Path, **settings: object) -> RunningSimulator:
