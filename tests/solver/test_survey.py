@@ -10,9 +10,7 @@ from solver.failures import SolveFailure
 from solver.response.solution import solve_many
 from solver.verification.estimates import Estimate
 from solver.verification.random_scenes import FAMILIES, random_scene, surface_set
-from solver.verification.survey import answers
-from solver.verification.survey.__main__ import main, rows
-from solver.verification.survey.statistics import HEADER, judgement, misses
+from solver.verification.survey import HEADER, Row, apart, judgement, main, misses, rows, solve
 from solver.verification.truth import TRUE_NUMBERS
 
 
@@ -65,19 +63,19 @@ TRUTH = np.array([1.0, 2.0, 3.0])
 
 
 def test_a_common_error_of_all_surfaces_falls_out_of_their_differences():
-    assert answers.apart(TRUTH + 0.3, np.array([TRUTH, TRUTH, TRUTH])) == pytest.approx((0.0, 0.0), abs=1e-15)
+    assert apart(TRUTH + 0.3, np.array([TRUTH, TRUTH, TRUTH])) == pytest.approx((0.0, 0.0), abs=1e-15)
 
 
 def test_a_difference_that_is_off_is_reported_by_the_range_and_so_is_the_doubt_of_the_truth():
     first = np.array([1.0, 0.0, 0.0])
     doubtful = TRUTH + 0.3 * first
-    error, doubt = answers.apart(TRUTH + 0.2 * first, np.array([TRUTH, TRUTH, doubtful]))
+    error, doubt = apart(TRUTH + 0.2 * first, np.array([TRUTH, TRUTH, doubtful]))
     assert error == pytest.approx(0.1 / 1.9, rel=1e-12)
     assert doubt == pytest.approx(0.2 / 1.9, rel=1e-12)
 
 
 def test_a_survey_of_answers_holds_every_estimate_of_the_program_against_fine_meshes():
-    row = answers.solve("axis", 0, "small")
+    row = solve("axis", 0, "small")
     (prediction,) = solve_many([random_scene("axis", 0, "small")])
     assert not isinstance(prediction, SolveFailure)
     sed, corrected, *_ = row.estimates[4:]  # the second answer, at the usual tolerance
@@ -90,8 +88,9 @@ def test_what_a_file_keeps_is_not_solved_again_and_stands_in_the_page(tmp_path, 
     keep, page = tmp_path / "kept.json", tmp_path / "page.md"
     entry = "| axis | finite | 9 | 90 % |"
     page.write_text(f"Before.\n<!-- judged: begin -->\n| axis | small | 0 |\n{entry}\n<!-- judged: end -->\nAfter.\n")
-    first = answers.Row("axis", 0, "small", (estimate(0.02, 0.01),))
-    assert list(rows([("axis", 0, "small")], keep, lambda *_: first)) == [first]
+    first = Row("axis", 0, "small", (estimate(0.02, 0.01),))
+    monkeypatch.setattr("solver.verification.survey.solve", lambda *_: first)
+    assert list(rows([("axis", 0, "small")], keep)) == [first]
     monkeypatch.setattr(sys, "argv", ["survey", "--scenes", "1", "--keep", str(keep), "--page", str(page)])
     main()
     line = "| axis | small | 1 | 100 % |"

@@ -1,1 +1,0 @@
-"""Surveys of error estimates against true errors over many random scenes."""
