@@ -45,30 +45,29 @@ class Subject:
 
     name: str  # key in the JSON file
     doing: str  # shown while it runs
-    share: float  # share of the time; later subjects get unused time
-    quick_share: float
+    shares: tuple[float, float]  # of the time, in a full and in a quick run; later subjects get unused time
     measure: "Callable[[Request], Iterator[DataclassInstance]]"
     kinds: "tuple[type[DataclassInstance], ...]"  # of its rows
 
 
 # The order matters: a subject may use the rows of earlier ones, and processes run even without time left.
 _SUBJECTS = (
-    Subject("machine", "machine", 0.0, 0.0, machine.measure, (machine.Machine,)),
-    Subject("truth", "overkill solves for the truth", 30.0, 1.5, truth.measure, (truth.Truth,)),
-    Subject("speed", "time against true error", 38.0, 3.5, speed.measure, (speed.Speed,)),
+    Subject("machine", "machine", (0.0, 0.0), machine.measure, (machine.Machine,)),
+    Subject("truth", "overkill solves for the truth", (30.0, 1.5), truth.measure, (truth.Truth,)),
+    Subject("speed", "time against true error", (38.0, 3.5), speed.measure, (speed.Speed,)),
     Subject(
-        "estimates", "estimates against true errors", 25.0, 1.8,
+        "estimates", "estimates against true errors", (25.0, 1.8),
         estimates.measure, (estimates.Estimate, estimates.GuaranteedCost),
     ),
-    Subject("costs", "cost breakdown", 6.0, 0.6, costs.measure, (costs.Cost,)),
-    Subject("warm", "the warm stepper", 10.0, 1.5, warm.measure, (warm.Warm,)),
-    Subject("histories", "courses against direct states", 8.0, 0.3, histories.measure, (histories.March,)),
-    Subject("problems", "published problems", 10.0, 1.6, problems.measure, (problems.Problem,)),
-    Subject("orders", "orders of convergence", 20.0, 1.3, orders.measure, (orders.Order,)),
-    Subject("growth", "growth with the unknowns", 12.0, 1.2, growth.measure, (growth.Growth,)),
-    Subject("hard_cases", "hard cases", 35.0, 2.0, hard_cases.measure, (hard_cases.HardCase,)),
-    Subject("processes", "cold starts and memory", 15.0, 2.5, processes.measure, (processes.Cold, processes.Memory)),
-    Subject("targets", "targets of speed", 0.0, 0.0, targets.measure, (targets.Target,)),
+    Subject("costs", "cost breakdown", (6.0, 0.6), costs.measure, (costs.Cost,)),
+    Subject("warm", "the warm stepper", (10.0, 1.5), warm.measure, (warm.Warm,)),
+    Subject("histories", "courses against direct states", (8.0, 0.3), histories.measure, (histories.March,)),
+    Subject("problems", "published problems", (10.0, 1.6), problems.measure, (problems.Problem,)),
+    Subject("orders", "orders of convergence", (20.0, 1.3), orders.measure, (orders.Order,)),
+    Subject("growth", "growth with the unknowns", (12.0, 1.2), growth.measure, (growth.Growth,)),
+    Subject("hard_cases", "hard cases", (35.0, 2.0), hard_cases.measure, (hard_cases.HardCase,)),
+    Subject("processes", "cold starts and memory", (15.0, 2.5), processes.measure, (processes.Cold, processes.Memory)),
+    Subject("targets", "targets of speed", (0.0, 0.0), targets.measure, (targets.Target,)),
 )  # fmt: skip
 _KINDS = {kind.__name__: kind for subject in _SUBJECTS for kind in subject.kinds}  # by their names in the JSON file
 
@@ -138,7 +137,7 @@ def measure(
         if stopped and subject.name not in _ALWAYS:
             left_out.append(f"Stopped before: {subject.doing}.")
             continue
-        part = _share(subject, quick) / max(sum(_share(s, quick) for s in subjects[number:]), 1e-9)
+        part = subject.shares[quick] / max(sum(later.shares[quick] for later in subjects[number:]), 1e-9)
         now = clock()
         request = Request(quick, now + max(end - now, 0.0) * part, clock, host, tuple(chain(*rows.values())))
         subject_rows: list[DataclassInstance] = []
@@ -168,7 +167,3 @@ def warm_up(progress: Progress) -> None:
         if kinematics == "small":
             solve(replace(request, solve=replace(request.solve, course="history")))
         stepper(scene).step(1e-3, 0.0)
-
-
-def _share(subject: Subject, quick: bool) -> float:
-    return subject.quick_share if quick else subject.share

@@ -21,15 +21,8 @@ from solver.verification.request import LeftOut, Request, clock
 
 KINEMATICS = tuple(MESHED)
 TRUE_NUMBERS = ("SED of the ending", "normal force", "drag")
-# fineness of three meshes, finer than those in `speed`, and whether they are moved by half an element
-SHIFTED = {
-    "small": ((26.0, False), (26.0, True), (23.0, False)),
-    "finite": ((30.0, False), (30.0, True), (26.0, False)),
-}
-SHIFTED_QUICK = {
-    "small": ((18.0, False), (18.0, True), (16.0, False)),
-    "finite": ((20.0, False), (20.0, True), (18.0, False)),
-}
+# fineness of the meshes, finer than those in `speed`, in a full and in a quick run; the first is also moved
+FINENESS = {"small": ((26.0, 23.0), (18.0, 16.0)), "finite": ((30.0, 26.0), (20.0, 18.0))}
 # the judged cases, whose speeds count
 JUDGED = ("slipperiness 0", "slipperiness 20", "slipperiness 55", "slipperiness 75", "slipperiness 100", "stickiness 0")
 
@@ -68,7 +61,8 @@ def mean_and_doubt(solves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _truths(request: Request, kinematics: Kinematics, surfaces: list[Scene]) -> Iterator[Truth | LeftOut]:
     start = clock()
     deepest = max(surfaces, key=lambda scene: scene.loading.depth)
-    meshes = [MESHED[kinematics](deepest, *m) for m in (SHIFTED_QUICK if request.quick else SHIFTED)[kinematics]]
+    first, second = FINENESS[kinematics][request.quick]
+    meshes = [MESHED[kinematics](deepest, *mesh) for mesh in ((first, False), (first, True), (second, False))]
     setup_s = (clock() - start) / len(surfaces)
     for number, scene in enumerate(sorted(surfaces, key=lambda scene: scene.title not in JUDGED)):
         if request.seconds_left <= 0.0 and scene.title not in JUDGED:  # other subjects need these

@@ -50,7 +50,7 @@ def subject(name, *rows):
                 raise row
             yield row
 
-    return Subject(name, f"the {name}", 1.0, 1.0, measure, ())
+    return Subject(name, f"the {name}", (1.0, 1.0), measure, ())
 
 
 def quiet(*_):

@@ -34,16 +34,10 @@ def of_scene(scene: Scene) -> Outcome:
 
 def of_answer(answer: Prediction | SolveFailure) -> Outcome:
     """Return the outcome of a solve."""
-    return _of_refusal(answer) if isinstance(answer, SolveFailure) else _of_answer(answer)
-
-
-def _of_refusal(failure: SolveFailure) -> Outcome:
-    summary = str(failure)
-    flaw = "" if summary.endswith(".") and "nan" not in summary.split() else "its reason is no sentence"
-    return Outcome(False, (), flaw, summary)
-
-
-def _of_answer(answer: Prediction) -> Outcome:
+    if isinstance(answer, SolveFailure):
+        summary = str(answer)
+        flaw = "" if summary.endswith(".") and "nan" not in summary.split() else "its reason is no sentence"
+        return Outcome(False, (), flaw, summary)
     checks = answer.audits
     flaws = [name for name in BALANCE if name in checks and not checks[name] < UNBALANCED]
     flaws += [name for name in _LIMITS if not checks[name] < EXCEEDED]

@@ -35,7 +35,7 @@ def join(grids: Sequence[Array]) -> Mesh:
     No node is held and none may touch.
     """
     clockwise = [g if _clockwise(g) else g[::-1] for g in grids]
-    meshes = [grid_mesh(g, _one_region(g), slice(0, 1), _NONE) for g in clockwise]
+    meshes = [grid_mesh(g, np.zeros(len(g[0]) // 2, np.int64), slice(0, 1), _NONE) for g in clockwise]
     nodes = np.concatenate([m.nodes for m in meshes])
     starts = np.cumsum([0, *(len(m.nodes) for m in meshes[:-1])])
     elements = np.concatenate([m.elements + s for m, s in zip(meshes, starts, strict=True)])
@@ -117,10 +117,6 @@ def disc(radius: float, finest: float, zone: float) -> Mesh:
     return replace(mesh, nodes=nodes, skin=chain(low, nodes[:, 0]))
 
 
-def _one_region(grid: Array) -> Indices:
-    return np.zeros((len(grid[0]) - 1) // 2, np.int64)
-
-
 def _clockwise(grid: Array) -> bool:
     first, second = grid[1, 0] - grid[0, 0], grid[0, 1] - grid[0, 0]
     return bool(first[0] * second[1] - first[1] * second[0] < 0)
@@ -171,12 +167,7 @@ def locate(mesh: Mesh, points: Array) -> tuple[Indices, Array]:
     return near[rows, best], local.reshape(*near.shape, 2)[rows, best]
 
 
-def stress(body: LinearBody, displacement: Array, points: Array) -> Array:
-    """Return the in-plane stress (p, 2, 2) [MPa] at `points` (p, 2) for displacements (nodes, 2)."""
-    return stress_at(body, displacement, *locate(body.mesh, points))
-
-
-def stress_at(body: LinearBody, displacement: Array, element: Indices, local: Array) -> Array:
+def stress(body: LinearBody, displacement: Array, element: Indices, local: Array) -> Array:
     """Return the in-plane stress (p, 2, 2) [MPa] at `local` coordinates (p, 2) of `element` (p,)."""
     mesh, elastic = body.mesh, body.elastic
     probes = Probes.at(mesh, elastic.centre, element, local)

@@ -24,6 +24,7 @@ from solver.verification.published.bodies import (
     grade,
     half_above,
     half_width,
+    locate,
     mirror,
     mound,
     stress,
@@ -128,7 +129,7 @@ class LightContact:
         """Return the stress (p, 2, 2) at `points` (p, 2), relative to the peak pressure, at small strain."""
         if not isinstance(self.body, LinearBody):
             raise TypeError("stresses are compared at small strain")
-        return stress(self.body, self.body.displacement(state.u), points) / self.peak
+        return stress(self.body, self.body.displacement(state.u), *locate(self.body.mesh, points)) / self.peak
 
     def shear(self, mu: float, part: float) -> EquilibriumState:
         """Return the state after a tangential force `part` mu P along -x is applied to the pressed state."""

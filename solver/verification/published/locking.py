@@ -6,7 +6,7 @@ from solver.arrays import Array, Indices
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive import Hooke
 from solver.mesh import Q2P1, Mesh
-from solver.verification.published.bodies import distort, membrane, ring, stress_at
+from solver.verification.published.bodies import distort, membrane, ring, stress
 
 INNER, OUTER, YOUNG = 3.0, 9.0, 1000.0  # radii [mm] and modulus [MPa] of the cylinder, under an inner pressure of 1 MPa
 _SHARE = INNER**2 / (OUTER**2 - INNER**2)
@@ -59,7 +59,7 @@ def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
     r2 = np.sum(at * at, axis=1)[:, None, None]
     across: Array = np.eye(2) - 2 * at[:, :, None] * at[:, None] / r2  # +1 across the radius, -1 along it
     closed_form: Array = _SHARE * (np.eye(2) + across * (OUTER**2 / r2))
-    misfit: Array = stress_at(body, displacement, element, local) - closed_form
+    misfit: Array = stress(body, displacement, element, local) - closed_form
     energy = 0.5 * float(np.sum(loads * displacement))
     true = 0.5 * 2 * np.pi * INNER * widening(nu)
     return (
