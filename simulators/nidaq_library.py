@@ -48,22 +48,18 @@ class SimulatedNidaqmx(ModuleType):
         self.range = (-10.0, 10.0)  # of the device, independent of the request [V]
         self.requests: list[tuple[Any, ...]] = []  # channels, terminals and limits
         self.now = stopwatch(clock)  # time of the device and the bench [s]
-        self._previous_modules: dict[str, ModuleType | None] = {}
+        self._previous_modules: dict[str, ModuleType] = {}
 
     def install(self) -> None:
         """Install it as the module `nidaqmx`."""
-        modules = {name: self if "." not in name else ModuleType(name) for name in _MODULES}
-        self._previous_modules = {name: sys.modules.get(name) for name in _MODULES}
-        sys.modules.update(modules)
+        self._previous_modules = {name: sys.modules[name] for name in _MODULES if name in sys.modules}
+        sys.modules.update({name: self if "." not in name else ModuleType(name) for name in _MODULES})
 
     def remove(self) -> None:
         """Undo `install`."""
-        for name, module in self._previous_modules.items():
-            if module is None:
-                sys.modules.pop(name, None)
-            else:
-                sys.modules[name] = module
-        self._previous_modules = {}
+        for name in _MODULES:
+            sys.modules.pop(name, None)
+        sys.modules.update(self._previous_modules)
 
     def Task(self) -> "_Task":  # noqa: N802 - NI's name
         """Return a new acquisition."""

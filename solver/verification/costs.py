@@ -62,7 +62,6 @@ def measure(request: Request) -> Iterator[Cost | LeftOut]:
 
 
 def _cost(kinematics: Kinematics, tolerance: float) -> Cost:
-    """Return the parts of one solve."""
     scene = replace(cases(kinematics)[-1], solve=Solve(kinematics, tolerance=tolerance))
     solve(scene)
     start, before = clock(), perf_counter()

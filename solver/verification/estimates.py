@@ -95,14 +95,14 @@ def _estimate_published(request: Request, kinematics: Kinematics) -> Iterator[Es
         scenes = [replace(s, solve=Solve(kinematics, tolerance=tolerance)) for s in surfaces]
         runs: list[Sequence[Prediction | SolveFailure]] = []
         took_s, results = median_time(lambda: runs.append(solve_many(scenes))), runs[-1]
-        rows: list[Estimate] = []
-        answers = [a for a in results if isinstance(a, Prediction)]
+        rows, answers = list[Estimate](), list[Prediction]()
         for scene, result in zip(surfaces, results, strict=True):
             if isinstance(result, SolveFailure):
                 yield LeftOut(f"{scene.title} at {kinematics} strain has no answer at {percent(tolerance)}: {result}")
-        for answer in answers:
-            truth = truths[answer.scene.title]
-            rows += compare(answer, tolerance, np.array(truth.numbers), np.array(truth.doubt))
+            else:
+                answers.append(result)
+                truth = truths[scene.title]
+                rows += compare(result, tolerance, np.array(truth.numbers), np.array(truth.doubt))
         yield from rows
         if answers:
             sed = [row for row in rows if row.number == TRUE_NUMBERS[0]]

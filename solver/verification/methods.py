@@ -1,6 +1,5 @@
 """A finger on one mesh, with one interface for measurements in both kinematics."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from time import perf_counter
@@ -28,8 +27,11 @@ Kinematics = Literal["small", "finite"]
 AnyFinger = TypeVar("AnyFinger", bound=Finger[Any])
 
 
-class MeshMethod(ABC, Generic[AnyFinger]):
-    """One finger on one mesh; `fineness` is elements per tip radius, `shift` moves the lines by half an element."""
+class MeshMethod(Generic[AnyFinger]):
+    """One finger on one mesh; `fineness` is elements per tip radius, `shift` moves the lines by half an element.
+
+    A method has `solve` and `floor` too: see `SmallMethod`.
+    """
 
     finger: AnyFinger
     setup_s: float  # mesh and tables
@@ -39,17 +41,6 @@ class MeshMethod(ABC, Generic[AnyFinger]):
     def dofs(self) -> int:
         """Number of unknown displacements."""
         return self.finger.body.mesh.dofs
-
-    @abstractmethod
-    def solve(self, scene: Scene, before: EquilibriumState | None = None) -> EquilibriumState:
-        """Return the settled state of `scene`, from the undeformed finger or from the state of a similar surface.
-
-        Raises SolveFailure where no state exists.
-        """
-
-    @abstractmethod
-    def floor(self) -> float:
-        """Return the time of one assembly, factorisation and solve of this system [s]."""
 
     def numbers(self, state: EquilibriumState) -> Array:
         """Return SED of the ending [MPa], normal force and drag [N/mm] (3,)."""
@@ -64,7 +55,6 @@ class SmallMethod(MeshMethod[LinearFinger]):
     """Small strain: the inside is condensed once, contact is solved on the skin."""
 
     def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
-        """Mesh and condense the finger of `scene`."""
         start, wall_start = clock(), perf_counter()
         self.finger = LinearFinger.of(scene, Sizing(fineness, scene.loading.depth, shift, margin=4.0))
         elapsed_s, wall_s = clock() - start, perf_counter() - wall_start
@@ -72,12 +62,15 @@ class SmallMethod(MeshMethod[LinearFinger]):
         self.setup_s = elapsed_s - self.prepared_s
 
     def solve(self, scene: Scene, before: EquilibriumState | None = None) -> EquilibriumState:
-        """Solve from the same guess for every surface; `before` is not used."""
+        """Return the settled state of `scene`. Raises SolveFailure where no state exists.
+
+        Every surface starts from the same guess, so `before`, the state of a similar surface, is not used.
+        """
         del before
         return settled_state(scene, self.finger)
 
     def floor(self) -> float:
-        """Time one assembly, factorisation and solve."""
+        """Return the time of one assembly, factorisation and solve of this system [s]."""
         skin, moduli = np.ones(self.finger.body.condensed.rest.shape), settled_moduli(self.finger.scene.materials)
         start = clock()
         LinearBody.of(self.finger.geometry.mesh, moduli).displacement(skin)
@@ -88,7 +81,6 @@ class FiniteMethod(MeshMethod[FiniteFinger]):
     """Finite strain on one mesh, started from a coarse mesh, which is kept for other surfaces."""
 
     def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
-        """Mesh the finger of `scene`."""
         start, sizing = clock(), Sizing(fineness, scene.loading.depth, shift, margin=CONTACT_MARGIN)
         self.finger = FiniteFinger.of(scene, sizing)
         self._coarse = FiniteFinger.of(
@@ -97,14 +89,17 @@ class FiniteMethod(MeshMethod[FiniteFinger]):
         self.setup_s = clock() - start
 
     def solve(self, scene: Scene, before: EquilibriumState | None = None) -> EquilibriumState:
-        """Solve from the coarse mesh, or from `before`."""
+        """Return the settled state of `scene`, from the coarse mesh or from `before`, the state of a similar surface.
+
+        Raises SolveFailure where no state exists.
+        """
         if before is None:
             with suppress(SolveFailure):  # with steep friction the skin may fold on the coarse mesh alone
                 before = self.finger.transfer(rough_state(self._coarse, scene), self._coarse)
         return slide_on_branch(self.finger, sliding_load(scene), start=before)
 
     def floor(self) -> float:
-        """Time one assembly, factorisation and solve."""
+        """Return the time of one assembly, factorisation and solve of this system [s]."""
         newton = self.finger.newton
         shape = EquilibriumState.undeformed(newton.condensed)
         start = clock()
