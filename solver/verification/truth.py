@@ -22,7 +22,7 @@ from solver.verification.request import LeftOut, Request, clock
 KINEMATICS = tuple(MESHED)
 TRUE_NUMBERS = ("SED of the ending", "normal force", "drag")
 # fineness of the meshes, finer than those in `speed`, in a full and in a quick run; the first is also moved
-FINENESS = {"small": ((26.0, 23.0), (18.0, 16.0)), "finite": ((30.0, 26.0), (20.0, 18.0))}
+TRUE_FINENESS = {"small": ((26.0, 23.0), (18.0, 16.0)), "finite": ((30.0, 26.0), (20.0, 18.0))}
 # the judged cases, whose speeds count
 JUDGED = ("slipperiness 0", "slipperiness 20", "slipperiness 55", "slipperiness 75", "slipperiness 100", "stickiness 0")
 
@@ -61,7 +61,7 @@ def mean_and_doubt(solves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _truths(request: Request, kinematics: Kinematics, surfaces: list[Scene]) -> Iterator[Truth | LeftOut]:
     start = clock()
     deepest = max(surfaces, key=lambda scene: scene.loading.depth)
-    first, second = FINENESS[kinematics][request.quick]
+    first, second = TRUE_FINENESS[kinematics][request.quick]
     meshes = [MESHED[kinematics](deepest, *mesh) for mesh in ((first, False), (first, True), (second, False))]
     setup_s = (clock() - start) / len(surfaces)
     for number, scene in enumerate(sorted(surfaces, key=lambda scene: scene.title not in JUDGED)):

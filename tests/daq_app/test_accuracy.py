@@ -31,7 +31,7 @@ from solver.verification.processes import Cold
 from solver.verification.published.problems import Problem
 from solver.verification.request import Host, LeftOut, Request
 from solver.verification.speed import MESHES, QUICK, Speed
-from solver.verification.truth import FINENESS, JUDGED, Truth, cases
+from solver.verification.truth import JUDGED, TRUE_FINENESS, Truth, cases
 from solver.verification.warm import Warm
 
 HOST = Host({}, tuple(interpreter()))
@@ -249,7 +249,7 @@ def test_a_mesh_that_gives_no_answer_for_one_of_the_surfaces_meets_nothing():
 @pytest.mark.parametrize(("speeds", "run"), [(MESHES, 0), (QUICK, 1)], ids=["full run", "quick run"])
 def test_the_truth_is_of_meshes_that_are_finer_than_all_whose_error_is_held_against_it(speeds, run):
     """A mesh that is itself a third of the truth would seem a third nearer to it than it is."""
-    assert all(max(speeds[kind]) <= 0.8 * min(FINENESS[kind][run]) for kind in speeds)
+    assert all(max(speeds[kind]) <= 0.8 * min(TRUE_FINENESS[kind][run]) for kind in speeds)
 
 
 def test_an_error_that_the_truth_is_too_uncertain_to_tell_is_neither_met_nor_missed():
