@@ -13,7 +13,7 @@ from contextlib import closing, nullcontext, suppress
 from dataclasses import asdict, dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -21,12 +21,12 @@ from daq_app.batch.pool import Lost, by_cluster, by_processes
 from daq_app.batch.sensitivity import Index, TooFewAnswers, sobol_indices
 from drivers.arrays import Array
 from sessions.file_access import json_object
+from sessions.prediction import Kinematics
 from sessions.prediction.surface_series import SERIES, Press, series_slopes
 from sessions.recording.head import software_versions
 from sessions.statistics.correlations import share_interval
 from solver import Friction, Loading, Receptor, Scene, Solve
 
-Kinematics = Literal["small", "finite"]
 # Numbers drawn at random, with their ranges. Nobody measured these: fingers of a lab's subjects would be better.
 # Thicknesses, bone and press scale with the tip radius or the series, so that every draw is a possible finger.
 DESIGN: Mapping[str, tuple[float, float]] = {

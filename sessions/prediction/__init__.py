@@ -3,7 +3,7 @@
 Each trial becomes a scene: its measured friction, its block's indentation, its direction and speed, and one finger.
 """
 
-from sessions.prediction.options import BY_NAME, PredictionOptions, finger_in, with_own_finger
+from sessions.prediction.options import BY_NAME, Kinematics, PredictionOptions, finger_in, with_own_finger
 from sessions.prediction.scenes import Progress, part_of, predict
 from sessions.prediction.stored import SessionPrediction, TrialPrediction
 from solver import Friction, Prediction, Scene
@@ -19,6 +19,7 @@ __all__ = [
     "Fields",
     "Friction",
     "History",
+    "Kinematics",
     "Nearby",
     "Prediction",
     "PredictionOptions",

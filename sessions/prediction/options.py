@@ -14,6 +14,7 @@ from solver.quantities import QUANTITIES, Quantity
 from solver.scene.published import BOUND_SCALE
 from solver.scene.published import Reading as TauReading
 
+Kinematics = Literal["small", "finite"]  # strain
 BY_NAME: Mapping[str, Quantity] = {quantity.name: quantity for quantity in QUANTITIES}
 
 
@@ -25,7 +26,7 @@ class PredictionOptions:
     scene: Scene | None = None  # source of finger, width, materials, receptor and tolerance; None: the published one
     indentation: float | None = None  # [mm], instead of each block's own
     course: Literal["steady", "history"] = "history"
-    kinematics: Literal["small", "finite"] = "small"
+    kinematics: Kinematics = "small"
     # Intervals of each SED from the uncertainty of friction, and variants: see `prediction.uncertainty`
     intervals: bool = False
     variant_intervals: bool = False  # also for variants at finite strain, which takes longer

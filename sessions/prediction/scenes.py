@@ -9,13 +9,7 @@ from typing import NamedTuple
 
 from sessions.plan.plan import DISTAL_TO_PROXIMAL, PROXIMAL_TO_DISTAL, Block, SessionPlan, Trial
 from sessions.prediction.options import PredictionOptions, bound, template, with_own_finger
-from sessions.prediction.stored import (
-    SessionPrediction,
-    TrialPrediction,
-    Variant,
-    known_error,
-    settled_numbers,
-)
+from sessions.prediction.stored import SessionPrediction, TrialPrediction, Variant, known_error, settled_numbers
 from sessions.strokes import Analysis, FrictionParameters, Stroke
 from solver import Finger, Friction, Loading, Prediction, Scene, SceneError, Slide, Solve, SolveFailure, solve_many
 from solver.accuracy.audits import inside_out_warning

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, cast
 import msgspec
 
 from sessions.plan.plan import Stimulus
-from sessions.prediction.options import PredictionOptions, template
+from sessions.prediction.options import Kinematics, PredictionOptions, TauReading, template
 from sessions.recording.derived import complete
 from sessions.strokes import Analysis
 from sessions.strokes.decisions import Decision
@@ -49,10 +49,8 @@ Driven = Literal["depth", "force", "other way"]
 class Variant:
     """A variant of a prediction."""
 
-    kinematics: Annotated[Literal["small", "finite"], Meaning("", "small or finite strain")]
-    tau_reading: Annotated[
-        Literal["computed", "as-printed"], Meaning("", "of tau_max: computed, or as-printed (a hundredth)")
-    ]
+    kinematics: Annotated[Kinematics, Meaning("", "small or finite strain")]
+    tau_reading: Annotated[TauReading, Meaning("", "of tau_max: computed, or as-printed (a hundredth)")]
     driven: Annotated[Driven, Meaning("", "by depth, by force (measured), or by depth the other way")]
 
     @property
@@ -78,11 +76,7 @@ _DRIVEN = {
 }
 
 
-_KINDS: Mapping[str, tuple[Literal["small", "finite"], ...]] = {
-    "none": (),
-    "small": ("small",),
-    "both": ("small", "finite"),
-}
+_KINDS: Mapping[str, tuple[Kinematics, ...]] = {"none": (), "small": ("small",), "both": ("small", "finite")}
 
 
 @dataclass(frozen=True, slots=True)

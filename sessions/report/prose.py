@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Mapping
 from itertools import takewhile
-from typing import Literal
 
 import numpy as np
 
+from sessions.prediction import Kinematics
 from sessions.prediction.stored import Ends, Variant
 from sessions.report.contents import Experiment, PredictionFinding, Report
 from sessions.report.tables.rivals import rivals_sentences
@@ -34,8 +34,8 @@ def doubts(report: Report) -> tuple[str, ...]:
     """Return sentences on what would change the sign of r between prediction and scores; empty without an r."""
     if all(p.sed is None for p in report.predictions) or not report.scored:
         return ()
-    strain: Literal["small", "finite"] = "small" if report.model.startswith("small") else "finite"
-    other_strain: Literal["small", "finite"] = "finite" if strain == "small" else "small"
+    strain: Kinematics = "small" if report.model.startswith("small") else "finite"
+    other_strain: Kinematics = "finite" if strain == "small" else "small"
     by_force = Variant(strain, "computed", "force")
     return (
         _in_variant(report, Variant(other_strain, "computed", "depth"), f"At {other_strain} strain"),

@@ -9,7 +9,6 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Literal
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from sessions.prediction import (
     QUANTITIES,
     SED,
     Friction,
+    Kinematics,
     Nearby,
     Prediction,
     Progress,
@@ -34,7 +34,6 @@ from sessions.strokes import Analysis, FrictionParameters, analyse
 from sessions.strokes.settings import AnalysisSettings, FilterSettings, Pair, SteadySettings, WindowRule
 from sessions.strokes.stroke import FIXED, HERTZ_EXPONENT, AreaLaw, Rule
 
-Kinematics = Literal["small", "finite"]
 Values = tuple[float | None, ...]  # of one quantity along each of `PATHS`, or only those at small strain
 
 # The usual value of each choice comes first.

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from sessions.prediction import SED, Quantity
+from sessions.statistics import scales, within_subjects
 from sessions.statistics.correlations import Relation, relation
 from sessions.statistics.findings import (
     CARRY_OVER,
@@ -29,18 +30,6 @@ from sessions.statistics.mixed_model import MixedModel, Spread, mixed_model, spr
 from sessions.statistics.multiverse import PathTrial, path_findings
 from sessions.statistics.psychometric import Psychometric, function_of
 from sessions.statistics.rivals import RESPONSES, STROKE_FIELDS, RivalTrial, rivals_of_surfaces, rivals_within
-from sessions.statistics.scales import (
-    MODELS,
-    Choice,
-    Exponent,
-    Judgement,
-    PairedScale,
-    consistence,
-    latent_comparisons,
-    latent_judgements,
-    paired_scale,
-    stevens_exponent,
-)
 from sessions.statistics.scores import (
     Average,
     IntervalEstimate,
@@ -53,17 +42,6 @@ from sessions.statistics.scores import (
     surface_means,
 )
 from sessions.statistics.visit import STILL_BLINDED, Exclusion, TrialRow, Visit, VisitOptions, exclusion_of, scores_of
-from sessions.statistics.within_subjects import (
-    RepeatedCorrelation,
-    Table,
-    agreement,
-    differences,
-    equal_moduli,
-    holm,
-    repeated_correlation,
-    within_means,
-    z_scores,
-)
 
 Trials = Sequence[tuple[Visit, TrialRow]]
 Points = Sequence[tuple[str, int, float, float]]  # subject, index, response to its own stroke, score
@@ -117,7 +95,7 @@ def pool_visits(
 def _with_holm(descriptors: Sequence[DescriptorFindings]) -> tuple[DescriptorFindings, ...]:
     within = {findings.descriptor: findings.repeated for findings in descriptors if findings.repeated is not None}
     p_values = {name: repeated.people_p for name, repeated in within.items() if repeated.people_p is not None}
-    adjusted = dict(zip(p_values, holm(list(p_values.values())), strict=True))
+    adjusted = dict(zip(p_values, within_subjects.holm(list(p_values.values())), strict=True))
     return tuple(replace(findings, repeated_holm=adjusted.get(findings.descriptor)) for findings in descriptors)
 
 
@@ -132,15 +110,15 @@ def _descriptor(
     points = [(subject, row, x, score) for subject, row, x, score in rows if x is not None and score is not None]
     number_points = tuple((subject, row.index, x, score) for subject, row, x, score in points)
     pairs = choices(trials)
-    scales = tuple(paired_scale(pairs, model) for model in MODELS) if pairs else ()
+    paired = tuple(scales.paired_scale(pairs, model) for model in scales.MODELS) if pairs else ()
     comparisons = constant_stimuli(trials)
     rival_trials = [RivalTrial(subject, row.index, score, rival_values(row)) for subject, row, _, score in points]
     return DescriptorFindings(
         descriptor=name,
         indices=indices,
         scores=tuple(mean for mean in mean_scores(tables) if mean.descriptor == name),
-        within=within_means(matrix),
-        agreement=agreement(matrix),
+        within=within_subjects.within_means(matrix),
+        agreement=within_subjects.agreement(matrix),
         surfaces=tuple(_surface(index, quantity.name, by_index[index]) for index in indices),
         answers={subject: tuple(row.get(index) for index in indices) for subject, row in matrix.items()},
         points=number_points,
@@ -150,12 +128,12 @@ def _descriptor(
         rivals=rivals_within(rival_trials, quantity.label),
         rivals_of_means=rivals_of_surfaces(rival_trials, quantity.label),
         without_subject=_without_subject(number_points),
-        normalised=_normalise(z_scores(matrix), number_points),
-        differences=differences(matrix),
+        normalised=_normalise(within_subjects.z_scores(matrix), number_points),
+        differences=within_subjects.differences(matrix),
         estimates=estimates(trials, quantity.name),
         exponent=exponent(trials),
-        scales=scales,
-        consistence=consistence(pairs),
+        scales=paired,
+        consistence=scales.consistence(pairs),
         on_response=_model(
             [(subject, row, score) for subject, row, _, score in points], quantity, response_term(quantity)
         ),
@@ -169,7 +147,7 @@ def _descriptor(
             within=True,
         ),
         constant_stimuli=comparisons,
-        latent=latent_scales(trials, scales, comparisons),
+        latent=latent_scales(trials, paired, comparisons),
     )
 
 
@@ -241,10 +219,10 @@ def _relation(points: Points) -> Relation | None:
     return relation(list(responses.values()), list(scores.values()), list(responses))
 
 
-def _correlation_within(points: Points) -> RepeatedCorrelation | None:
+def _correlation_within(points: Points) -> within_subjects.RepeatedCorrelation | None:
     """Return the correlation of scores with responses within subjects."""
     subjects, _, responses, scores = zip(*points, strict=True) if points else ((), (), (), ())
-    return repeated_correlation(subjects, responses, scores)
+    return within_subjects.repeated_correlation(subjects, responses, scores)
 
 
 def _without_subject(points: Points) -> tuple[tuple[str, float], ...]:
@@ -254,13 +232,13 @@ def _without_subject(points: Points) -> tuple[tuple[str, float], ...]:
     return tuple((subject, repeated.r) for subject, repeated in rows if repeated is not None)
 
 
-def _normalise(table: Table, points: Points) -> NormalisedScores:
+def _normalise(table: within_subjects.Table, points: Points) -> NormalisedScores:
     """Return statistics of standardised scores and the responses in `points`."""
     pairs = [(subject, i, x, table[subject][i]) for subject, i, x, _ in points if i in table.get(subject, {})]
     return NormalisedScores(_averages(table), _relation(pairs), _correlation_within(pairs))
 
 
-def _averages(table: Table) -> dict[int, Average]:
+def _averages(table: within_subjects.Table) -> dict[int, Average]:
     """Return the mean over subjects of each index."""
     by_index = by_key((index, number) for row in table.values() for index, number in row.items())
     return {index: mean for index, values in sorted(by_index.items()) if (mean := average(values)) is not None}
@@ -282,10 +260,12 @@ def estimates(trials: Trials, quantity: str) -> Estimates | None:
     }
     points = [(subject, row.index, x, log) for subject, row, log in logs if (x := row.response(quantity)) is not None]
     left_out = tuple(sorted(no_logarithm))
-    return Estimates(_averages(table), _averages(equal_moduli(table)), _correlation_within(points), left_out)
+    return Estimates(
+        _averages(table), _averages(within_subjects.equal_moduli(table)), _correlation_within(points), left_out
+    )
 
 
-def exponent(trials: Trials) -> Exponent | None:
+def exponent(trials: Trials) -> scales.Exponent | None:
     """Return Stevens' exponent of magnitude estimates on the µ of the same strokes; None without estimates."""
     if all(row.estimate is None for _, row in trials):
         return None
@@ -295,17 +275,17 @@ def exponent(trials: Trials) -> Exponent | None:
         if row.estimate is not None and row.estimate > 0.0 and row.mu is not None and row.mu > 0.0
     ]
     if not complete:
-        return Exponent(0, 0, None, reason="no trial has both an estimate above 0 and a µ of its own stroke")
-    return stevens_exponent(*zip(*complete, strict=True))
+        return scales.Exponent(0, 0, None, reason="no trial has both an estimate above 0 and a µ of its own stroke")
+    return scales.stevens_exponent(*zip(*complete, strict=True))
 
 
-def choices(trials: Trials) -> list[Choice]:
+def choices(trials: Trials) -> list[scales.Choice]:
     """Return all choices between a trial's surface and the one stroked just before it, without a standard.
 
     Pairs with a standard have a psychometric function; they alone leave most scales unbounded.
     """
     return [
-        Choice(visit.subject, row.before, row.index, row.choice == "first")
+        scales.Choice(visit.subject, row.before, row.index, row.choice == "first")
         for visit, row in trials
         if row.choice is not None and row.before is not None and row.standard is None
     ]
@@ -338,22 +318,22 @@ def subject_function(trials: Trials) -> Psychometric:
 
 
 def latent_scales(
-    trials: Trials, scales: Sequence[PairedScale], comparisons: ConstantStimuli | None
-) -> Mapping[Judgement, Mapping[int, IntervalEstimate]]:
+    trials: Trials, paired: Sequence[scales.PairedScale], comparisons: ConstantStimuli | None
+) -> Mapping[scales.Judgement, Mapping[int, IntervalEstimate]]:
     """Return the latent values of each surface by each kind of judgement that has any."""
     scores = [(visit.subject, row.index, row.score) for visit, row in trials if row.score is not None]
     estimates = [(visit.subject, row.index, row.estimate) for visit, row in trials if row.estimate is not None]
     logs = [(subject, index, math.log(estimate)) for subject, index, estimate in estimates if estimate > 0.0]
     jnd = None if comparisons is None else comparisons.jnd
-    by_judgement: dict[Judgement, Mapping[int, IntervalEstimate]] = {
-        "scores": latent_judgements(scores),
-        "estimates": latent_judgements(logs),
+    by_judgement: dict[scales.Judgement, Mapping[int, IntervalEstimate]] = {
+        "scores": scales.latent_judgements(scores),
+        "estimates": scales.latent_judgements(logs),
     }
-    for scale in scales:
+    for scale in paired:
         if scale.model == "Thurstone V":
             by_judgement["choices"] = scale.values
     if jnd is not None and jnd.low is not None and jnd.high is not None:
         log_mu = by_key((row.index, math.log(row.mu)) for _, row in trials if row.standard is not None and row.mu)
         mean_mu = {index: math.exp(float(np.mean(logs))) for index, logs in sorted(log_mu.items())}
-        by_judgement["comparisons"] = latent_comparisons(mean_mu, (jnd.mean, jnd.low, jnd.high))
+        by_judgement["comparisons"] = scales.latent_comparisons(mean_mu, (jnd.mean, jnd.low, jnd.high))
     return {judgement: values for judgement, values in by_judgement.items() if values}
