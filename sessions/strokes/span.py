@@ -31,43 +31,14 @@ class Zero:
         return f"{self.start:.3f} to {self.stop:.3f} s"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class QuietWindows:
-    """Windows in which no force moves more than its noise and the normal force is low; k of them, in order."""
+def _quiet_windows(time: Array, wrench: Array, rate: float, settings: AnalysisSettings) -> Indices:
+    """Return first and past-last reading of each unloaded window (k, 2) of a wrench (n, 6) at `time` (n,) [s].
 
-    time: Array  # (n,) of all readings [s]
-    wrench: Array  # (n, 6) of all readings, face frame, not zeroed [N, N mm]
-    bounds: Indices  # (k, 2) first and past-last reading
-
-    def zero_before(self, instant: float, longest: float) -> Zero | None:
-        """Return the zero of the last quiet windows that end by `instant` [s], over at most `longest` [s]."""
-        earlier = self.bounds[self.time[self.bounds[:, 1] - 1] < instant]
-        return self._merge(earlier[::-1], longest) if len(earlier) else None
-
-    def zero_after(self, instant: float, longest: float) -> Zero | None:
-        """Return the zero of the first quiet windows that start after `instant` [s], over at most `longest` [s]."""
-        later = self.bounds[self.time[self.bounds[:, 0]] > instant]
-        return self._merge(later, longest) if len(later) else None
-
-    def _merge(self, windows: Indices, longest: float) -> Zero:
-        start, stop = windows[0]
-        for next_start, next_stop in windows[1:]:
-            low, high = min(start, next_start), max(stop, next_stop)
-            overlap = next_start <= stop and next_stop >= start
-            if not overlap or self.time[high - 1] - self.time[low] > longest:
-                break
-            start, stop = low, high
-        stretch = self.wrench[start:stop]
-        noise = stretch.std(axis=0, ddof=1)
-        times = float(self.time[start]), float(self.time[stop - 1])
-        return Zero(*times, stretch.mean(axis=0), noise, noise / len(stretch) ** 0.5)
-
-
-def quiet_windows(time: Array, wrench: Array, rate: float, settings: AnalysisSettings) -> QuietWindows:
-    """Return the unloaded windows of a wrench (n, 6) [N, N mm; face frame] at `time` (n,) [s]."""
+    In these no force moves more than its noise, and the normal force is low.
+    """
     length = max(settings.detector.baseline_readings, round(settings.detector.baseline * rate))
     if len(wrench) < length:
-        return QuietWindows(time, wrench, np.empty((0, 2), np.int64))
+        return np.empty((0, 2), np.int64)
     starts = np.arange(0, len(wrench) - length + 1, max(1, length // settings.zero.quiet_hops))
     spread, noise = _spread(wrench[:, :3], starts, length)
     low, high = np.percentile(-wrench[:, 2], [0.5, 99.5])
@@ -82,7 +53,7 @@ def quiet_windows(time: Array, wrench: Array, rate: float, settings: AnalysisSet
     unloaded = level - low <= max(settings.zero.unloaded_share * (high - low), threshold)
     unbroken = time[starts + length - 1] - time[starts] <= settings.zero.quiet_gap * length / rate
     firsts = starts[quiet & unloaded & unbroken]
-    return QuietWindows(time, wrench, np.column_stack([firsts, firsts + length]).astype(np.int64))
+    return np.column_stack([firsts, firsts + length]).astype(np.int64)
 
 
 def _spread(axes: Array, starts: Indices, length: int) -> tuple[Array, Array]:
@@ -104,7 +75,7 @@ class Span:
     smooth: Array  # (n, 6) the same, filtered; nan in stretches too short for the filter
     rate: float  # [Hz]
     filtered: str  # description of the filter
-    windows: QuietWindows
+    quiet: Indices  # (k, 2) first and past-last reading of each unloaded window, in order
     quality: SignalQuality
     saturation_times: Array  # times of readings left out because they were saturated [s]
     torque_step: float  # least step of a torque [N mm]; 0 where it is negligible
@@ -134,7 +105,7 @@ def span_of(
         smooth,
         sound.rate,
         filtered,
-        quiet_windows(time, wrench, sound.rate, settings),
+        _quiet_windows(time, wrench, sound.rate, settings),
         sound,
         block.time[sound.saturated],
         _least_step(wrench[:, 3:]),
@@ -148,6 +119,33 @@ def _least_step(torques: Array) -> float:
     # Where most values repeat, the steps are those of the sensor.
     levels = (column for column in map(np.unique, torques.T) if 1 < len(column) < len(torques) / 2)
     return max((float(np.median(np.diff(column))) for column in levels), default=0.0)
+
+
+def zero_before(span: Span, instant: float) -> Zero | None:
+    """Return the zero of the last unloaded windows that end by `instant` [s]; None without any."""
+    return _zero_of(span, span.quiet[span.time[span.quiet[:, 1] - 1] < instant][::-1])
+
+
+def zero_after(span: Span, instant: float) -> Zero | None:
+    """Return the zero of the first unloaded windows that start after `instant` [s]; None without any."""
+    return _zero_of(span, span.quiet[span.time[span.quiet[:, 0]] > instant])
+
+
+def _zero_of(span: Span, windows: Indices) -> Zero | None:
+    """Return the zero over the first of the windows (k, 2) and those that overlap, up to the longest stretch."""
+    if not len(windows):
+        return None
+    start, stop = windows[0]
+    for next_start, next_stop in windows[1:]:
+        low, high = min(start, next_start), max(stop, next_stop)
+        overlap = next_start <= stop and next_stop >= start
+        if not overlap or span.time[high - 1] - span.time[low] > span.settings.zero.zero_stretch:
+            break
+        start, stop = low, high
+    stretch = span.wrench[start:stop]
+    noise = stretch.std(axis=0, ddof=1)
+    times = float(span.time[start]), float(span.time[stop - 1])
+    return Zero(*times, stretch.mean(axis=0), noise, noise / len(stretch) ** 0.5)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,9 +165,8 @@ class StrokeZero:
 
 def zero_for(span: Span, contact: Contact, idle: Mask) -> StrokeZero | None:
     """Return a stroke's zero from unloaded stretches around it, if any; `idle` (n,) marks unloaded readings."""
-    onset, lift, longest = contact.onset, contact.lift, span.settings.zero.zero_stretch
-    earlier = None if onset is None else span.windows.zero_before(onset, longest)
-    following = None if lift is None else span.windows.zero_after(lift, longest)
+    earlier = None if contact.onset is None else zero_before(span, contact.onset)
+    following = None if contact.lift is None else zero_after(span, contact.lift)
     zero = earlier or following
     if zero is None:
         return None

@@ -27,7 +27,7 @@ from sessions.strokes.decisions import Decisions, StrokeDecisions
 from sessions.strokes.settings import AnalysisSettings, Pair
 from sessions.strokes.signal_quality import signal_quality
 from sessions.strokes.sliding import block_means, displacement
-from sessions.strokes.span import Span, StrokeZero, recorded_zero, span_of, track_of, zero_for
+from sessions.strokes.span import Span, StrokeZero, recorded_zero, span_of, track_of, zero_after, zero_for
 from sessions.strokes.stroke import Flaw, FlawName, Stroke, significant
 from sessions.strokes.stroke_measures import measure_stroke
 
@@ -119,7 +119,7 @@ def _common_zero(span: Span, context: TrialContext) -> StrokeZero | None:
     """Return the zero for detecting contacts; None where it is unknown."""
     if context.zero_is_stated:
         return recorded_zero(span, is_stated=True)
-    first = span.windows.zero_after(-np.inf, context.settings.zero.zero_stretch)
+    first = zero_after(span, -np.inf)
     if first is not None:
         return StrokeZero(first.level, first.noise, first.noise[:3], 0.0, first.error)
     return recorded_zero(span, is_stated=False) if context.info.calibration.raw_unit == RAW_WRENCH else None

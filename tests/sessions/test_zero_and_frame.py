@@ -27,29 +27,30 @@ from scipy import stats
 from sessions.plan.plan import Frame
 from sessions.strokes import ZERO_SETTING, ZERO_STATED
 from sessions.strokes.contacts import Contact
-from sessions.strokes.span import QuietWindows, zero_for
+from sessions.strokes.span import zero_after, zero_before, zero_for
 from sessions.strokes.stroke_measures import EVERYTHING
 
 TENTHS = np.arange(100.0) / 10.0  # [s]
 WINDOWS = np.array([[0, 20], [10, 30], [20, 40], [60, 80]])
 
 
-def quiet(before=0.0, after=0.0):
+def quiet(before=0.0, after=0.0, longest=10.0):
     """Return quiet windows over noise, with a force along x that is `before` up to 5 s and `after` from then on."""
+    settings = replace(SETTINGS, zero=replace(SETTINGS.zero, zero_stretch=longest))
     readings = np.random.default_rng(8).normal(size=(100, 6))
     readings[:, 0] += np.where(TENTHS < 5.0, before, after)
-    return QuietWindows(TENTHS, readings, WINDOWS)
+    return SimpleNamespace(time=TENTHS, wrench=readings, smooth=readings, quiet=WINDOWS, settings=settings)
 
 
 @pytest.mark.parametrize(
     ("zero", "readings"),
     [
-        (quiet().zero_before(8.5, 10.0), slice(60, 80)),  # the one before does not overlap
-        (quiet().zero_before(6.0, 10.0), slice(0, 40)),
-        (quiet().zero_before(6.0, 2.95), slice(10, 40)),  # all three last longer
-        (quiet().zero_before(3.0, 10.0), slice(0, 30)),
-        (quiet().zero_after(0.5, 10.0), slice(10, 40)),
-        (quiet().zero_after(2.0, 10.0), slice(60, 80)),  # a window has to begin after the instant
+        (zero_before(quiet(), 8.5), slice(60, 80)),  # the one before does not overlap
+        (zero_before(quiet(), 6.0), slice(0, 40)),
+        (zero_before(quiet(longest=2.95), 6.0), slice(10, 40)),  # all three last longer
+        (zero_before(quiet(), 3.0), slice(0, 30)),
+        (zero_after(quiet(), 0.5), slice(10, 40)),
+        (zero_after(quiet(), 2.0), slice(60, 80)),  # a window has to begin after the instant
     ],
 )
 def test_a_zero_is_the_mean_of_overlapping_quiet_windows_with_its_standard_error(zero, readings):
@@ -57,15 +58,14 @@ def test_a_zero_is_the_mean_of_overlapping_quiet_windows_with_its_standard_error
     assert (zero.start, zero.stop) == (TENTHS[readings][0], TENTHS[readings][-1])
     assert zero.level == pytest.approx(stretch.mean(axis=0))
     assert zero.error == pytest.approx(stats.sem(stretch))
-    assert quiet().zero_before(1.9, 10.0) is quiet().zero_after(6.0, 10.0) is None
+    assert zero_before(quiet(), 1.9) is zero_after(quiet(), 6.0) is None
 
 
 @pytest.mark.parametrize("step", [0.0, 12.0])
 def test_a_zero_that_drifts_lies_half_way_with_the_deviation_of_a_uniform_distribution(step):
-    windows = quiet(after=step)
-    span = SimpleNamespace(time=TENTHS, windows=windows, smooth=windows.wrench, settings=SETTINGS)
+    span = quiet(after=step, longest=2.0)
     zero = zero_for(span, Contact(45, 55, 4.5, 5.5), np.zeros(100, bool))
-    before, after = windows.wrench[20:40], windows.wrench[60:80]
+    before, after = span.wrench[20:40], span.wrench[60:80]
     drift, noise = after.mean(axis=0) - before.mean(axis=0), np.hypot(stats.sem(before), stats.sem(after))
     assert zero.level == pytest.approx(before.mean(axis=0) + drift / 2.0)
     # of the mean of two zeros, and of a step that noise does not explain, uniformly anywhere between them
