@@ -14,7 +14,7 @@ import numpy as np
 
 from drivers.arrays import Array
 from sessions.prediction.options import BY_NAME
-from sessions.prediction.stored import Ends, SessionPrediction, TrialPrediction
+from sessions.prediction.stored import Ends, SessionPrediction
 from sessions.strokes.stroke import Meaning, meanings
 from solver.quantities import NAMES, QUANTITIES, SED
 
@@ -139,16 +139,16 @@ def session_firing(
     Where tissues relax, only the SED has a time course: other quantities give no firing.
     """
     settings = settings or AfferentSettings()
-    values = (_settled_response(row, settings.quantity) for row in prediction.trials)
-    sizes = [abs(value) for value in values if value is not None]
+    settled = [row.responses.get(settings.quantity) for row in prediction.trials]
+    sizes = [abs(response.value) for response in settled if response is not None]
     if not sizes:
         return None, ()
     reference = float(np.median(sizes))
     firings: list[Firing] = []
-    for number, row in enumerate(prediction.trials):
-        value = _settled_response(row, settings.quantity)
-        if row.history is None or value is None:
+    for number, (row, response) in enumerate(zip(prediction.trials, settled, strict=True)):
+        if row.history is None or response is None:
             continue
+        value = response.value
         course = np.abs(row.history.responses[:, NAMES.index(settings.quantity)])
         if not np.isfinite(course).all():
             continue
@@ -165,13 +165,6 @@ def session_firing(
         level = _settled_rate(value, reference, settings)
         firings.append(Firing(row.trial, time, rate, level, spikes, peak, settled_ends))
     return reference, tuple(firings)
-
-
-def _settled_response(row: TrialPrediction, quantity: str) -> float | None:
-    """Return a quantity at the ending in the settled state; None without one."""
-    if quantity == SED.name:
-        return row.sed
-    return row.responses[quantity][0] if quantity in row.responses else None
 
 
 def _settled_rate(value: float, reference: float, settings: AfferentSettings) -> float:

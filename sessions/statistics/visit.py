@@ -22,7 +22,7 @@ from sessions.statistics.multiverse import Values, trial_paths
 from sessions.statistics.scores import Score, ScoreTable
 from sessions.strokes import Analysis, AnalysisSettings, FrictionParameters, analyse
 from sessions.strokes.stroke import FIXED, AreaLaw, Meaning
-from sessions.toml_file import NotAllowed, load_toml
+from sessions.toml_file import check, load_toml
 
 EXCLUSIONS = "exclusions.toml"
 
@@ -38,8 +38,7 @@ class Exclusion:
 
     def __post_init__(self) -> None:
         for key, content in (("subject", "a subject's code"), ("why", "the reason"), ("who", "who decided it")):
-            if not getattr(self, key).strip():
-                raise NotAllowed(key, getattr(self, key), f"{content}, not empty")
+            check(bool(getattr(self, key).strip()), key, getattr(self, key), f"{content}, not empty")
 
 
 @dataclass(frozen=True, slots=True)

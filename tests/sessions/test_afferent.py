@@ -18,6 +18,7 @@ from sessions.prediction.afferent import (
     usual_settings,
 )
 from sessions.report.trials import afferent_facts
+from solver.prediction import Response
 from solver.quantities import NAMES
 
 USUAL = AfferentSettings()
@@ -61,10 +62,9 @@ def rows(seds, interval=None):
     return tuple(
         SimpleNamespace(
             trial=i,
-            sed=value[0],
             history=SimpleNamespace(time=time, responses=ramp * value),
             interval=interval,
-            responses={name: (response, 0.0) for name, response in zip(NAMES, value.tolist(), strict=True)},
+            responses={name: Response(response, 0.0) for name, response in zip(NAMES, value.tolist(), strict=True)},
         )
         for i, value in enumerate(values, 1)
     )
