@@ -111,8 +111,3 @@ def _hold(curve: StrokeCurve, onset: float, times: Array, displacement: Array) -
         return None
     upto = slice(0, int(plateau[-1]) + 1)
     return HoldCurve(time[upto], travel[upto], force[upto])
-
-
-def deepest(curves: PressCurves) -> float:
-    """Return the greatest travel of any press [mm]."""
-    return max(float(press.displacement.max() - press.touch) for press in curves.presses)

@@ -271,10 +271,8 @@ def constant_readings(raw: Array, runs: tuple[ConstantRun, ...], *, clipped: boo
     """Mark the readings (n,) of frozen runs; or, if `clipped`, all readings at a value where an axis was clipped."""
     marks = np.zeros(len(raw), np.bool_)
     for run in runs:
-        if clipped and run.clipped:
-            marks |= raw[:, run.axis] == run.value
-        elif not clipped and not run.clipped:
-            marks[run.first + 1 : run.last + 1] = True
+        if run.clipped is clipped:
+            marks[raw[:, run.axis] == run.value if clipped else slice(run.first + 1, run.last + 1)] = True
     return marks
 
 

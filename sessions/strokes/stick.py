@@ -126,11 +126,9 @@ class ClimbReadings:
 
         A climb that begins at the first reading can only begin later.
         """
-        later = float(slopes[:, 0] @ residual) > 0.0
-        free = [1, 4, 5]
-        free += [0] if climb.begins > self.time[0] or later else []
-        free += [2] if bends else []
-        return sorted(free + ([3, 6] if climb.fall > 0.0 else []))
+        begins_freely = climb.begins > self.time[0] or float(slopes[:, 0] @ residual) > 0.0
+        is_free = (begins_freely, True, bends, climb.fall > 0.0, True, True, climb.fall > 0.0)
+        return [position for position, free in enumerate(is_free) if free]
 
     def mean_square(self, climb: Climb) -> float:
         """Return the mean square of a climb's residuals of T/N [-]."""

@@ -23,7 +23,7 @@ from sessions.plan.plan import SessionPlan
 from sessions.prediction import PredictionOptions, finger_in, with_own_finger
 from sessions.prediction.finger_fit import FingerFit, Interval, fit
 from sessions.prediction.options import template
-from sessions.prediction.press_curves import PressCurves, deepest, press_curves
+from sessions.prediction.press_curves import PressCurves, press_curves
 from sessions.prediction.press_model import LAYERS, Check, FitError, check, press_model
 from sessions.prediction.relaxation_fit import RelaxationFit, relaxing_fit
 from sessions.recording import Recording
@@ -135,7 +135,8 @@ def _fit(
     scene, _ = (None, "") if options.finger is None else finger_in(options.finger)
     finger = template(with_own_finger(PredictionOptions(scene=scene), plan))
     progress = console.reporter("solving presses")
-    model = press_model(finger, float(np.log(options.prior)), DEEPER * deepest(curves), options.mu, progress)
+    deepest = max(float(press.displacement.max() - press.touch) for press in curves.presses)  # [mm]
+    model = press_model(finger, float(np.log(options.prior)), DEEPER * deepest, options.mu, progress)
     if options.relaxation:
         finger_fit, rate = relaxing_fit(
             model, [press for press, _ in holds], [hold for _, hold in holds], gain_error, options.seed
