@@ -26,8 +26,16 @@ class _Audience:
     doing: str = ""
 
 
+@dataclass(slots=True)
+class _Caller:
+    """The callback of a caller, and the last part of the work that it was told."""
+
+    progress: Progress | None
+    part: float = 0.0
+
+
 _AUDIENCE: ContextVar[_Audience | None] = ContextVar("audience", default=None)
-_CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: None)
+_CALLER: ContextVar[_Caller | None] = ContextVar("caller", default=None)
 
 
 @contextmanager
@@ -57,18 +65,24 @@ def report_progress(doing: str, part: float = 0.0) -> None:
 
 
 @contextmanager
-def interruptible(progress: Progress | None, part: Callable[[], float]) -> Generator[None]:
-    """Let `check_stop` call `progress` with the `part` done in this thread, until the block ends."""
-    token = _CHECK.set(lambda: report_part(progress, part()))
+def interruptible(progress: Progress | None) -> Generator[None]:
+    """Let `check_stop` call `progress` in this thread, until the block ends."""
+    token = _CALLER.set(_Caller(progress))
     try:
         yield
     finally:
-        _CHECK.reset(token)
+        _CALLER.reset(token)
 
 
-def check_stop() -> None:
-    """Raise Cancelled where the caller stops the solve. Code calls it between any two steps that take long."""
-    _CHECK.get()()
+def check_stop(part: float | None = None) -> None:
+    """Raise Cancelled where the caller stops the solve; `part` is the part of the work done, None for no change.
+
+    Code calls it between any two steps that take long.
+    """
+    caller = _CALLER.get()
+    if caller is not None:
+        caller.part = caller.part if part is None else part
+        report_part(caller.progress, caller.part)
 
 
 def report_part(progress: Progress | None, part: float) -> None:

@@ -16,7 +16,7 @@ same way for the worst pair of surfaces. Only the edges differ: those of two sur
 changes add as squares.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from math import ceil
@@ -273,14 +273,14 @@ LEAST_RANGE = 1e-5  # smallest range relative to the values: smaller errors of d
 SENSOR_RESOLUTION = 1e-3  # relative, of a force or depth
 
 
-def compared_sets(scenes: Sequence[Scene]) -> list[list[int]]:
+def compared_sets(scenes: Mapping[int, Scene]) -> list[list[int]]:
     """Return the sets of scenes that are compared: two or more surfaces under the same loading.
 
     Scenes with quick evidence belong to no set. They are variants of one surface, whose differences come from
     `solver.response.nearby`.
     """
     sets: dict[object, list[int]] = {}
-    for number, scene in enumerate(scenes):
+    for number, scene in scenes.items():
         if scene.solve.evidence != "quick":
             sets.setdefault(scene.loading_group, []).append(number)
     return [numbers for numbers in sets.values() if len({scenes[n] for n in numbers}) > 1]

@@ -248,11 +248,11 @@ def _width(scene: Scene, width: float) -> dict[str, Any]:
 
 COARSE = 0.5  # tolerance that the coarsest mesh meets
 Answer = Prediction | SolveFailure
-Answers = Callable[[Sequence[Scene]], tuple[Answer, ...]]
+SolveMany = Callable[[Sequence[Scene]], tuple[Answer, ...]]
 MEASURED = "measured on a coarse mesh: change of the ending's SED "
 
 
-def measure_differences(prediction: Prediction, answers: Answers) -> Prediction:
+def measure_differences(prediction: Prediction, answers: SolveMany) -> Prediction:
     """Return `prediction` with measured differences in place of estimates where a solve gives them."""
     start = perf_counter()
     scene = replace(prediction.scene, solve=replace(prediction.scene.solve, evidence="estimated", tolerance=COARSE))
@@ -279,7 +279,7 @@ def with_left_out(prediction: Prediction, left_out: Mapping[str, Any], start: fl
     )
 
 
-def _differences(scene: Scene, base: Prediction, answers: Answers) -> dict[str, dict[str, Any]]:
+def _differences(scene: Scene, base: Prediction, answers: SolveMany) -> dict[str, dict[str, Any]]:
     """Return the entries that were measured, with new `estimate`, `from` and `how`."""
     out: dict[str, dict[str, Any]] = {}
     if scene.finger.bone == "rigid":
@@ -292,7 +292,7 @@ def _differences(scene: Scene, base: Prediction, answers: Answers) -> dict[str, 
     return out
 
 
-def _with_meshed_bone(scene: Scene, answers: Answers) -> Answer | SceneError:
+def _with_meshed_bone(scene: Scene, answers: SolveMany) -> Answer | SceneError:
     """Return the answer of a scene with a meshed bone, or the SceneError of a bone too stiff for the tissues."""
     try:
         return answers((replace(scene, finger=replace(scene.finger, bone="meshed")),))[0]

@@ -297,6 +297,9 @@ class Lines:
         )
 
 
+Fineness = float | Lines  # of a finger's mesh: elements per tip radius, or the lines themselves
+
+
 def _divide(lines: tuple[float, ...], parts: Indices) -> tuple[float, ...]:
     gaps = zip(pairwise(lines), parts.tolist(), strict=True)
     return (*(a + (b - a) * part / count for (a, b), count in gaps for part in range(count)), *lines[-1:])

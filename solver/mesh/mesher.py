@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import Array, Indices
-from solver.mesh import Lines, Mesh, distinct, grid_mesh, with_middles
+from solver.mesh import Fineness, Lines, Mesh, distinct, grid_mesh, with_middles
 from solver.scene.tables import Finger, Receptor
 
 
@@ -154,7 +154,7 @@ _SIZES = ElementSizes()
 class Sizing:
     """Element sizes of a mesh and where they apply."""
 
-    fineness: float | Lines  # elements per tip radius, or the lines themselves
+    fineness: Fineness
     indentation: float  # skin lower than this may touch [mm]
     shift: bool = False  # move the mesh along the skin by half an element
     margin: float = 1.0  # undeformed skin lower than (1 + margin/4) indentation may touch

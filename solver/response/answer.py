@@ -1,7 +1,7 @@
 """Solutions of scenes, and their predictions: results with error estimates, skin, history and omitted effects."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,17 +9,17 @@ import numpy as np
 from solver._kernels.contact_system import bounded_length
 from solver.accuracy import audits
 from solver.accuracy.error_estimate import Steps, errors, responses, row_errors
-from solver.accuracy.omitted_effects import model, warnings
+from solver.accuracy.omitted_effects import Answer, model, warnings
 from solver.arrays import Array
 from solver.body import Patches
 from solver.contact import STATE_NAMES
+from solver.continuation.small_states import expected_depth
 from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.finger import Finger, LinearFinger
 from solver.equilibrium.load_path import Instant, LoadPath
-from solver.failures import NotConverged, SolveFailure
-from solver.mesh import Lines
+from solver.failures import NotConverged
+from solver.mesh import Fineness
 from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Prediction, Row, Skin, drag, sed_alone
-from solver.progress import Progress
 from solver.scene import Scene
 
 # Elements per tip radius of the first mesh. At finite strain, skin folds on a mesh of 3 under steep friction; 5 takes a
@@ -140,28 +140,28 @@ def history(scene: Scene, finger: Finger[Patches], path: LoadPath) -> History:
     )
 
 
-Answer = Prediction | SolveFailure
-Watch = Callable[[int, Answer, LinearFinger, tuple[Instant, ...] | None], None]  # position, answer, finger, load path
-
-
+Scenes = dict[int, Scene]  # by number
+Answers = dict[int, Answer]
+Watch = Callable[[int, Answer, LinearFinger, tuple[Instant, ...] | None], None]  # number, answer, finger, load path
 LoadingGroup = tuple[float, float, str]  # depth, force and direction: `Scene.loading_group`
 
 
 class Meshing(ABC):
     """Solves scenes of one finger on meshes of any fineness, and keeps meshes for reuse."""
 
-    def __init__(self, scenes: Sequence[Scene], depths: Sequence[float], progress: Progress | None) -> None:
-        """Start without meshes; these are made for the `depths` [mm] of `scenes`, estimated where forces are given."""
-        self.progress = progress
+    def __init__(self, scenes: Scenes) -> None:
+        """Start without meshes; these are made for the depths of `scenes`, estimated where forces are given."""
+        self.scene = next(iter(scenes.values()))  # for finger, materials and receptor
         self.deepest: dict[LoadingGroup, float] = {}  # [mm]
-        for scene, depth in zip(scenes, depths, strict=True):
+        for scene in scenes.values():
+            depth = expected_depth(scene)
             self.deepest[scene.loading_group] = max(depth, self.deepest.get(scene.loading_group, 0.0))
 
     @abstractmethod
-    def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:
-        """Return the prediction or the failure of each scene on meshes of a `fineness`.
+    def answers(self, scenes: Scenes, fineness: Fineness, watch: Watch | None = None) -> Answers:
+        """Return the prediction or the failure of each numbered scene on meshes of a `fineness`.
 
-        Raises SceneError where the finger cannot be meshed, Cancelled where `progress` says so.
+        Raises SceneError where the finger cannot be meshed, Cancelled.
         """
 
 

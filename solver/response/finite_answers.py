@@ -1,6 +1,6 @@
 """Solve scenes at finite strain with error estimates, on successively finer meshes from coarser solutions."""
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from time import perf_counter
@@ -20,15 +20,16 @@ from solver.equilibrium.load_path import end_of_path, march_scene
 from solver.equilibrium.load_stepping import forces_of, sliding_load
 from solver.equilibrium.relaxation import CondensedRelaxing
 from solver.failures import WRINKLES, Folds, NoSteadyState, NotConverged, SolveFailure
-from solver.mesh import Lines
+from solver.mesh import Fineness, Lines
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
-from solver.progress import Progress, check_stop, interruptible, report_progress
+from solver.progress import check_stop, report_progress
 from solver.response.answer import (
     FIRST_FINENESS,
-    Answer,
+    Answers,
     LoadingGroup,
     Meshing,
+    Scenes,
     SceneSolution,
     Watch,
     complete_audits,
@@ -46,30 +47,19 @@ class MeshSolution:
     """A settled state on the mesh made for it."""
 
     finger: FiniteFinger
-    sizing: Sizing
     state: EquilibriumState
     setup_s: float  # meshes and tables [s]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class NestedSolution:
-    """The solutions of one scene on the coarse mesh and on the mesh of the answer."""
-
-    coarse: MeshSolution
-    top: MeshSolution
-    steps: Steps | None = None  # of the load path, where the state depends on it
 
 
 class Meshes:
     """A cache of the meshes of one finger and of coarse solutions, for scenes with the same press and slide."""
 
     def __init__(self) -> None:
-        """Start empty."""
         self._fingers: dict[Sizing, FiniteFinger] = {}
         self._coarse: dict[tuple[Scene, Sizing], MeshSolution | SolveFailure] = {}
         self._last: MeshSolution | None = None
 
-    def keep(self, fineness: float | Lines) -> None:
+    def keep(self, fineness: Fineness) -> None:
         """Drop all meshes but the coarse one and those of this fineness."""
         self._fingers = {
             sizing: f for sizing, f in self._fingers.items() if sizing.fineness in (FIRST_FINENESS, fineness)
@@ -81,29 +71,33 @@ class Meshes:
             self._fingers[sizing] = FiniteFinger.of(scene, sizing)
         return self._fingers[sizing]
 
+    def solve(self, scene: Scene, sizing: Sizing, settle: Callable[[FiniteFinger], EquilibriumState]) -> MeshSolution:
+        """Return the state that `settle` finds on a mesh, and the time to set this up. Raises as `finger`, `settle`."""
+        start = perf_counter()
+        finger = self.finger(scene, sizing)
+        setup = perf_counter() - start
+        return MeshSolution(finger, settle(finger), setup)
+
     def coarse(self, scene: Scene, sizing: Sizing) -> MeshSolution:
         """Return a scene's solution on a coarse mesh, started from the last solution on it. Raises SolveFailure.
 
         It is the settled state, or full slip where a given drag is close to the friction limit.
         """
-        is_new = (scene, sizing) not in self._coarse
-        if is_new:
-            start = perf_counter()
-            finger = self.finger(scene, sizing)
-            setup = perf_counter() - start
-            near = None if self._last is None or self._last.finger is not finger else self._last.state
-            try:
-                self._last = MeshSolution(finger, sizing, _on_coarse(finger, scene, near), setup)
-                self._coarse[scene, sizing] = self._last
-            except SolveFailure as failure:
-                self._coarse[scene, sizing] = failure
-        solution = self._coarse[scene, sizing]
+        solution = self._coarse.get((scene, sizing))
         if isinstance(solution, SolveFailure):
             raise solution
-        return solution if is_new else replace(solution, setup_s=0.0)
+        if solution is not None:
+            return replace(solution, setup_s=0.0)
+        try:
+            self._last = self.solve(scene, sizing, lambda finger: _on_coarse(finger, scene, self._last))
+        except SolveFailure as failure:
+            self._coarse[scene, sizing] = failure
+            raise
+        self._coarse[scene, sizing] = self._last
+        return self._last
 
 
-def coarse_solution(scene: Scene, guess: float, fineness: float | Lines, meshes: Meshes) -> MeshSolution:
+def coarse_solution(scene: Scene, guess: float, fineness: Fineness, meshes: Meshes) -> MeshSolution:
     """Return the settled state on a coarse mesh, from which solutions on finer meshes start.
 
     `guess` is the depth [mm], an estimate where forces are given. The friction limit differs a little between
@@ -142,17 +136,18 @@ def coarse_solution(scene: Scene, guess: float, fineness: float | Lines, meshes:
 
 
 def _solve_uniform(scene: Scene, sizing: Sizing, meshes: Meshes) -> MeshSolution:
-    start = perf_counter()
-    finger = meshes.finger(scene, sizing)
-    setup = perf_counter() - start
-    state = settled_state(finger, scene)
-    if sizing.margin < WIDER and state.reaches_end:
+    solution = meshes.solve(scene, sizing, lambda finger: settled_state(finger, scene))
+    if sizing.margin < WIDER and solution.state.reaches_end:
         return _solve_uniform(scene, replace(sizing, margin=WIDER), meshes)
-    return MeshSolution(finger, sizing, state, setup)
+    return solution
 
 
-def _on_coarse(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None) -> EquilibriumState:
-    """Return the state on the coarse mesh, or full slip where a given drag is close to the friction limit there."""
+def _on_coarse(finger: FiniteFinger, scene: Scene, last: MeshSolution | None) -> EquilibriumState:
+    """Return the state on the coarse mesh, or full slip where a given drag is close to the friction limit there.
+
+    The search begins at the `last` solution, where it has this mesh.
+    """
+    near = last.state if last is not None and last.finger is finger else None
     drag = scene.tangential_force
     if drag is None:
         return rough_state(finger, scene, near)
@@ -163,15 +158,18 @@ def _on_coarse(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None
     return slide if drag >= NEAR_SLIDE * abs(slide.force[0]) else march_scene(scene, finger).last
 
 
-def refine(scene: Scene, fineness: float | Lines, coarse: MeshSolution, meshes: Meshes) -> NestedSolution:
-    """Return the settled state, refined from the scene's `coarse` solution. Raises as `solution_on`."""
+def refine(scene: Scene, fineness: Fineness, coarse: MeshSolution, meshes: Meshes) -> tuple[MeshSolution, Steps | None]:
+    """Return the settled state, refined from the scene's `coarse` solution, and its load steps if it depends on them.
+
+    Raises as `solution_on`.
+    """
     steps = choose_steps(scene, coarse.finger, coarse.state)
-    sizing = replace(coarse.sizing, fineness=fineness)
-    top = solution_on(scene, sizing, coarse, meshes, 1 if steps is None else steps.factor)
-    if top.sizing.margin < WIDER and top.state.reaches_end:
-        wider = replace(sizing, margin=WIDER)
-        top = solution_on(scene, wider, coarse, meshes, 1 if steps is None else steps.factor)
-    return NestedSolution(coarse, top, steps)
+    sizing = replace(coarse.finger.geometry.sizing, fineness=fineness)
+    step_factor = 1 if steps is None else steps.factor
+    top = solution_on(scene, sizing, coarse, meshes, step_factor)
+    if sizing.margin < WIDER and top.state.reaches_end:
+        top = solution_on(scene, replace(sizing, margin=WIDER), coarse, meshes, step_factor)
+    return top, steps
 
 
 def solution_on(
@@ -181,18 +179,12 @@ def solution_on(
 
     A load path takes `step_factor` times the usual steps. Raises NoSteadyState, NotConverged, Cancelled.
     """
-    start = _starting_solution(scene, sizing, below, meshes)
-    return replace(start, state=settled_state(start.finger, scene, start.state, step_factor))
 
+    def settle(finger: FiniteFinger) -> EquilibriumState:
+        start = below.state if finger is below.finger else finger.transfer(below.state, below.finger)
+        return settled_state(finger, scene, start, step_factor)
 
-def _starting_solution(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes) -> MeshSolution:
-    """Return a mesh of `sizing` with the solution `below` transferred to it, from which Newton starts."""
-    start = perf_counter()
-    finger = meshes.finger(scene, sizing)
-    if finger is below.finger:
-        return replace(below, setup_s=0.0)
-    state = finger.transfer(below.state, below.finger)
-    return MeshSolution(finger, sizing, state, perf_counter() - start)
+    return meshes.solve(scene, sizing, settle)
 
 
 def solve_nested(
@@ -204,8 +196,8 @@ def solve_nested(
     """
     if not top.finger.newton.is_stable(top.state):
         return Folds(WRINKLES), steps
-    start = _starting_solution(scene, replace(top.sizing, halved=True), top, meshes)
-    finger = start.finger
+    finger = meshes.finger(scene, replace(top.finger.geometry.sizing, halved=True))
+    start = finger.transfer(top.state, top.finger)
     try:
         if top.state.load.path_dependent:
             if steps is None:  # the coarse mesh had full slip
@@ -214,7 +206,7 @@ def solve_nested(
             state = end_of_path(scene, finger)
         else:
             steps = None
-            state = slide_near(finger, scene, start.state) or settled_state(finger, scene, start.state)
+            state = slide_near(finger, scene, start) or settled_state(finger, scene, start)
         order = order_of(finger, state)
     except Folds as failure:
         return failure, steps
@@ -234,27 +226,30 @@ class FiniteMeshing(Meshing):
     Scenes with the same press and slide share meshes. They are solved by rising friction, each from the previous one.
     """
 
-    def __init__(self, scenes: Sequence[Scene], depths: Sequence[float], progress: Progress | None) -> None:
-        """Start without meshes."""
-        super().__init__(scenes, depths, progress)
+    def __init__(self, scenes: Scenes) -> None:
+        super().__init__(scenes)
         self._meshes: dict[LoadingGroup, Meshes] = {}
 
-    def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:  # noqa: ARG002 - for small strain
+    def answers(
+        self,
+        scenes: Scenes,
+        fineness: Fineness,
+        watch: Watch | None = None,  # noqa: ARG002 - for small strain
+    ) -> Answers:
         """Return the prediction or the failure of each scene on meshes of a `fineness`. Raises as `Meshing`."""
-        answers: dict[int, Answer] = {}
-        with interruptible(self.progress, lambda: len(answers) / len(scenes)):
-            for number in sorted(range(len(scenes)), key=lambda n: solution_order(scenes[n])):
-                check_stop()
-                start, scene = perf_counter(), scenes[number]
-                report_progress("solving on a finer mesh" if isinstance(fineness, Lines) else "solving on a mesh")
-                meshes = self._meshes.setdefault(scene.loading_group, Meshes())
-                meshes.keep(fineness)
-                try:
-                    coarse = coarse_solution(scene, self.deepest[scene.loading_group], fineness, meshes)
-                    answers[number] = _predict(scene, refine(scene, fineness, coarse, meshes), meshes, start)
-                except SolveFailure as failure:
-                    answers[number] = failure
-        return [answers[number] for number in range(len(scenes))]
+        answers: Answers = {}
+        for number, scene in sorted(scenes.items(), key=lambda entry: solution_order(entry[1])):
+            check_stop(len(answers) / len(scenes))
+            start = perf_counter()
+            report_progress("solving on a finer mesh" if isinstance(fineness, Lines) else "solving on a mesh")
+            meshes = self._meshes.setdefault(scene.loading_group, Meshes())
+            meshes.keep(fineness)
+            try:
+                coarse = coarse_solution(scene, self.deepest[scene.loading_group], fineness, meshes)
+                answers[number] = _predict(scene, fineness, coarse, meshes, start)
+            except SolveFailure as failure:
+                answers[number] = failure
+        return {number: answers[number] for number in scenes}
 
 
 def solution_order(scene: Scene) -> tuple[LoadingGroup, float]:
@@ -262,13 +257,16 @@ def solution_order(scene: Scene) -> tuple[LoadingGroup, float]:
     return scene.loading_group, float(scene.friction.mu)
 
 
-def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float) -> Prediction:
-    """Return the prediction of a scene solved at finite strain. Raises SolveFailure, Cancelled."""
-    top, steps = nested.top, nested.steps
+def _predict(scene: Scene, fineness: Fineness, coarse: MeshSolution, meshes: Meshes, start: float) -> Prediction:
+    """Return the prediction of a scene from its `coarse` solution; its work began at `start` [s].
+
+    Raises SolveFailure, Cancelled.
+    """
+    top, steps = refine(scene, fineness, coarse, meshes)
     finger, state, path = top.finger, top.state, None
-    setup = nested.coarse.setup_s + top.setup_s
+    setup = coarse.setup_s + top.setup_s
     if scene.solve.course == "history":
-        step_factor = steps_of_press(scene, nested.coarse.finger) if steps is None else steps.factor
+        step_factor = steps_of_press(scene, coarse.finger) if steps is None else steps.factor
         for slide in scene.earlier_slides():  # one that never settles is refused with its limits
             settled_state(finger, slide)
         path = march_scene(scene, finger, step_factor, relaxing=scene.materials.relax)

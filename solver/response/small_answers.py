@@ -28,11 +28,11 @@ from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import end_of_path, march_scene
 from solver.equilibrium.load_stepping import forces_of
 from solver.failures import NotConverged, SolveFailure
-from solver.mesh import Lines
+from solver.mesh import Fineness
 from solver.mesh.mesher import Sizing
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction
-from solver.progress import Progress, report_part
-from solver.response.answer import Answer, Meshing, SceneSolution, Watch, complete_audits, prediction
+from solver.progress import check_stop
+from solver.response.answer import Answers, Meshing, Scenes, SceneSolution, Watch, complete_audits, prediction
 from solver.scene import Scene
 
 SMALL_IMBALANCE = 1e-10  # relative residual of the forces from which a state is refined [-]
@@ -51,47 +51,45 @@ BEYOND_THE_SKIN = NotConverged(
 class SmallMeshing(Meshing):
     """Small strain: all scenes share one mesh and its nested mesh."""
 
-    def __init__(self, scenes: Sequence[Scene], depths: Sequence[float], progress: Progress | None) -> None:
-        """Start without meshes."""
-        super().__init__(scenes, depths, progress)
+    def __init__(self, scenes: Scenes) -> None:
+        super().__init__(scenes)
         self._fingers: dict[Sizing, tuple[LinearFinger, float]] = {}  # and the time to make each [s]
 
-    def _finger(self, scene: Scene, sizing: Sizing) -> tuple[LinearFinger, float]:
+    def _finger(self, sizing: Sizing) -> tuple[LinearFinger, float]:
         if sizing not in self._fingers:
             start = perf_counter()
-            finger = LinearFinger.of(scene, sizing)
+            finger = LinearFinger.of(self.scene, sizing)
             self._fingers[sizing] = finger, perf_counter() - start
         return self._fingers[sizing]
 
-    def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:
+    def answers(self, scenes: Scenes, fineness: Fineness, watch: Watch | None = None) -> Answers:
         """Return the answers as `Meshing`; where contact leaves the skin considered, solve all on a mesh with more."""
         self._fingers = {sizing: entry for sizing, entry in self._fingers.items() if sizing.fineness == fineness}
         deep = max(self.deepest.values())
-        most = max(deep, min(WIDE_MARGIN * deep, scenes[0].finger.pulp_thickness()))  # for drags with much contact
+        most = max(deep, min(WIDE_MARGIN * deep, self.scene.finger.pulp_thickness()))  # for drags with much contact
         narrow, wide = (Sizing(fineness, depth, margin=WIDE_MARGIN) for depth in (deep, most))
         try:
             results = self._on_mesh(scenes, narrow, watch, last=False)
             return self._on_mesh(scenes, wide, watch, last=True) if len(results) < len(scenes) else results
         except NotConverged as failure:  # the stiffness of a mesh is lost in round-off
-            return [failure] * len(scenes)
+            return dict.fromkeys(scenes, failure)
 
-    def _on_mesh(self, scenes: list[Scene], sizing: Sizing, watch: Watch | None, *, last: bool) -> list[Answer]:
-        """Return the answers on one mesh; an empty list where contact leaves the skin that this mesh considers.
+    def _on_mesh(self, scenes: Scenes, sizing: Sizing, watch: Watch | None, *, last: bool) -> Answers:
+        """Return the answers on one mesh; none where contact leaves the skin that this mesh considers.
 
         Full slip is solved by falling friction, since the steepest has the longest contact. On the `last` mesh a scene
         whose contact leaves that skin gets a failure.
         """
-        finger, setup_s = self._finger(scenes[0], sizing)
-        answers: dict[int, Answer] = {}
+        finger, setup_s = self._finger(sizing)
+        answers: Answers = {}
         # Full slip takes milliseconds and shares one estimate; `watch` receives a load path as soon as it is marched.
-        every = range(len(scenes))
-        steepest_first = sorted(every, key=lambda number: -float(scenes[number].friction.mu))
-        stepwise = any(scene.solve.course == "history" for scene in scenes)
-        for batch in [[number] for number in every] if stepwise else [steepest_first]:
+        steepest_first = sorted(scenes, key=lambda number: -float(scenes[number].friction.mu))
+        stepwise = any(scene.solve.course == "history" for scene in scenes.values())
+        for batch in [[number] for number in scenes] if stepwise else [steepest_first]:
             states: dict[int, SceneSolution] = {}
             for number in batch:
                 position = len(answers) + len(states)
-                report_part(self.progress, position / len(scenes))
+                check_stop(position / len(scenes))
                 try:
                     solution = self._solve_state(scenes[number], finger, position, len(scenes))
                 except SolveFailure as failure:
@@ -102,7 +100,7 @@ class SmallMeshing(Meshing):
                 elif last:
                     answers[number] = BEYOND_THE_SKIN
                 else:
-                    return []
+                    return {}
             if states:
                 answers |= zip(states, self._predict(list(states.values()), finger, sizing), strict=True)
             if watch is not None:
@@ -110,7 +108,7 @@ class SmallMeshing(Meshing):
                     if answers[number] is not BEYOND_THE_SKIN:
                         path = states[number].elastic_path if number in states else None
                         watch(number, answers[number], finger, path)
-        return [answers[number] for number in every]
+        return {number: answers[number] for number in scenes}
 
     def _solve_state(self, scene: Scene, finger: LinearFinger, position: int, count: int) -> SceneSolution | None:
         """Return the state of one of `count` scenes; None where contact leaves the skin that the mesh considers.
@@ -132,10 +130,9 @@ class SmallMeshing(Meshing):
             steady = state_on_branch(scene, finger, step_factor)
         path, state, relaxing = None, steady, history and scene.materials.relax
         if history:
-            progress = self.progress
 
             def report(_: str, part: float) -> None:
-                report_part(progress, (position + part) / count)
+                check_stop((position + part) / count)
 
             path = march_scene(scene, finger, step_factor, relaxing=relaxing, report=report)
             state = path.last
@@ -161,7 +158,7 @@ class SmallMeshing(Meshing):
         numbers[:, FORCES_AND_PLACES:] = finger.ending.responses(displacements)[:, 0].T
         numbers[:, 0] = numbers[:, FORCES_AND_PLACES]
         rows = finger.row.average(displacements)
-        mesh, _ = self._finger(solutions[0].scene, replace(sizing, halved=True))
+        mesh, _ = self._finger(replace(sizing, halved=True))
         nested = nested_numbers_of_all(mesh, solutions, numbers)
         estimate_s = (perf_counter() - start) / len(solutions)
         return [

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -10,17 +9,16 @@ from solver._kernels.contact_system import SHEAR_LIMITED_MU
 from solver.accuracy.adaptivity import refine_lines
 from solver.accuracy.convergence_order import trial_warnings
 from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error
-from solver.accuracy.omitted_effects import COARSE, Answers, measure_differences
+from solver.accuracy.omitted_effects import COARSE, Answer, measure_differences
 from solver.accuracy.residual_overstress import with_viscosity
-from solver.continuation.small_states import expected_depth
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 from solver.failures import Folds, NotConverged, SolveFailure
-from solver.mesh import Lines
+from solver.mesh import Fineness
 from solver.mesh.mesher import FingerMesh
 from solver.prediction import Prediction, percent
-from solver.progress import Progress, interruptible, report_progress
-from solver.response.answer import FIRST_FINENESS, Answer, Meshing, Watch
+from solver.progress import Progress, check_stop, interruptible, report_progress
+from solver.response.answer import FIRST_FINENESS, Answers, Meshing, Scenes, Watch
 from solver.response.finite_answers import FiniteMeshing
 from solver.response.small_answers import SmallMeshing
 from solver.scene import Scene
@@ -70,7 +68,7 @@ def solve_many(
         if id(answer) not in by_id:
             if rough is not None and isinstance(answer, Prediction):
                 rough(answer)
-            by_id[id(answer)] = answer, _with_evidence(answer, progress)
+            by_id[id(answer)] = answer, _with_evidence(answer)
         return by_id[id(answer)][1]
 
     def watch_with_evidence(
@@ -79,121 +77,97 @@ def solve_many(
         assert watch is not None
         watch(number, add_evidence(answer), finger, path)
 
-    answers = _answers(tuple(scenes), progress, watch_with_evidence if watch else None, rough)
-    return tuple(add_evidence(answer) for answer in answers)
+    with interruptible(progress):
+        answers = _answers(tuple(scenes), watch_with_evidence if watch else None, rough)
+        return tuple(add_evidence(answer) for answer in answers)
 
 
-def _answers(
-    scenes: Sequence[Scene], progress: Progress | None = None, watch: Watch | None = None, rough: Rough | None = None
-) -> tuple[Answer, ...]:
+def _answers(scenes: Sequence[Scene], watch: Watch | None = None, rough: Rough | None = None) -> tuple[Answer, ...]:
     """Return the answers of `solve_many` before `_with_evidence`."""
+    groups: dict[object, Scenes] = {}  # of scenes that share meshes
+    for number, scene in enumerate(scenes):
+        groups.setdefault((scene.solve.kinematics, scene.finger, scene.materials, scene.receptor), {})[number] = scene
     out: dict[int, Answer] = {}
-    for group in _groups(scenes):
-        answers = _solve_group([scenes[i] for i in group], progress, _within(watch, group), rough)
-        out |= dict(zip(group, answers, strict=True))
-    answers = (out[i] for i in range(len(scenes)))
+    for group in groups.values():
+        out |= _solve_group(group, watch, rough)
+    answers = (out[number] for number in range(len(scenes)))
     return tuple(answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer for answer in answers)
 
 
-def _with_evidence(prediction: Answer, progress: Progress | None) -> Answer:
+def _with_evidence(prediction: Answer) -> Answer:
     """Return a prediction with the evidence on omitted effects that its scene requests; a failure unchanged."""
     if not isinstance(prediction, Prediction) or prediction.scene.solve.evidence == "quick":
         return prediction
     report_progress("estimating what the model leaves out")
-    with interruptible(progress, lambda: 1.0):
-        prediction = with_viscosity(prediction)
-    prediction = _with_earlier_slides(prediction, lambda scenes: _answers(scenes, progress))
+    check_stop(1.0)
+    prediction = _with_earlier_slides(with_viscosity(prediction))
     if prediction.scene.solve.evidence == "estimated":
         return prediction
     report_progress("measuring what the model leaves out")
-    return measure_differences(prediction, lambda scenes: _answers(scenes, progress))
+    return measure_differences(prediction, _answers)
 
 
-def _with_earlier_slides(prediction: Prediction, solve: Answers) -> Prediction:
+def _with_earlier_slides(prediction: Prediction) -> Prediction:
     """Return a prediction with a warning for each earlier slide that has no settled state on a coarse mesh."""
     earlier = prediction.scene.earlier_slides() if prediction.scene.solve.course == "steady" else ()
     coarse = [replace(slide, solve=replace(slide.solve, tolerance=COARSE, evidence="estimated")) for slide in earlier]
-    failures = [slide for slide in solve(coarse) if isinstance(slide, SolveFailure)] if coarse else []
     sentences = (
         f"A slide before this one, the other way, has no settled state that it could come from: {slide}"
-        for slide in failures
+        for slide in _answers(coarse)
+        if isinstance(slide, SolveFailure)
     )
     return replace(prediction, warnings=(*prediction.warnings, *sentences))
 
 
-def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
-    """Return the positions of scenes in groups that share meshes, in the order of their first scenes."""
-    out: dict[object, list[int]] = {}
-    for position, scene in enumerate(scenes):
-        key = (scene.solve.kinematics, scene.finger, scene.materials, scene.receptor)
-        out.setdefault(key, []).append(position)
-    return list(out.values())
-
-
-def _within(watch: Watch | None, group: Sequence[int]) -> Watch | None:
-    """Return `watch` for the scenes of a `group`, to be called with positions within the group."""
-    if watch is None:
-        return None
-    return lambda number, answer, finger, path: watch(group[number], answer, finger, path)
-
-
-def _solve_group(
-    scenes: list[Scene], progress: Progress | None, watch: Watch | None, rough: Rough | None
-) -> list[Answer]:
+def _solve_group(scenes: Scenes, watch: Watch | None, rough: Rough | None) -> Answers:
     """Return the answers of scenes that share meshes."""
-    kind = scenes[0].solve.kinematics
-    meshing = MESHINGS[kind](scenes, [expected_depth(scene) for scene in scenes], progress)
-    if kind == "small" and any(scene.solve.course == "history" for scene in scenes):
+    kind = next(iter(scenes.values())).solve.kinematics
+    meshing = MESHINGS[kind](scenes)
+    if kind == "small" and any(scene.solve.course == "history" for scene in scenes.values()):
         return _march(scenes, meshing, watch)
-    refinement = _refine(scenes, meshing, watch, rough)
-    return list(map(_add_warnings, refinement.answers, refinement.warnings))
+    answers, warnings = _refine(scenes, meshing, watch, rough)
+    return {number: _add_warnings(answer, warnings[number]) for number, answer in answers.items()}
 
 
-def _march(scenes: list[Scene], meshing: Meshing, watch: Watch | None) -> list[Answer]:
+def _march(scenes: Scenes, meshing: Meshing, watch: Watch | None) -> Answers:
     """Return the answers of load paths, each marched once, on the finest mesh that a settled state needs.
 
     Warnings of a settled state apply to its load path too.
     """
-    ends = [replace(scene, solve=replace(scene.solve, course="steady")) for scene in scenes]
-    refinement = _refine(ends, meshing, None, None)
-    settled = [answer for answer in refinement.answers if isinstance(answer, Prediction)]
-    mesh: float | Lines = LIMIT_FINENESS
+    ends = {i: replace(scene, solve=replace(scene.solve, course="steady")) for i, scene in scenes.items()}
+    answers, warnings = _refine(ends, meshing, None, None)
+    settled = [answer for answer in answers.values() if isinstance(answer, Prediction)]
+    mesh: Fineness = LIMIT_FINENESS
     if settled:
         mesh = max(settled, key=lambda answer: answer.dofs).geometry.sizing.fineness
-    answers_of_courses: dict[int, Answer] = {}
+    with_warnings: dict[int, Answer] = {}
 
     def record(number: int, answer: Answer, finger: LinearFinger, path: tuple[Instant, ...] | None) -> None:
-        answers_of_courses[number] = _add_warnings(answer, refinement.warnings[number])
+        with_warnings[number] = _add_warnings(answer, warnings[number])
         if watch is not None:
-            watch(number, answers_of_courses[number], finger, path)
+            watch(number, with_warnings[number], finger, path)
 
-    answers = meshing.answers(scenes, mesh, record)
-    return [answers_of_courses.get(number, answer) for number, answer in enumerate(answers)]
-
-
-class _Refinement(NamedTuple):
-    """The answers of scenes that share meshes, after the last refinement."""
-
-    answers: list[Answer]
-    warnings: list[tuple[str, ...]]  # of each answer, about errors that the finest mesh leaves
+    return meshing.answers(scenes, mesh, record) | with_warnings
 
 
-def _refine(scenes: list[Scene], meshing: Meshing, watch: Watch | None, rough: Rough | None) -> _Refinement:
+def _refine(
+    scenes: Scenes, meshing: Meshing, watch: Watch | None, rough: Rough | None
+) -> tuple[dict[int, Answer], dict[int, tuple[str, ...]]]:
     """Refine until every error estimate meets its tolerance, including those of contrasts, or no mesh may be finer.
 
-    Scenes that share a mesh share the finer one. Where that has no state, `_coarser_counts` decides which answer stays.
+    Returns the answers, and warnings about errors that the finest mesh leaves. Scenes that share a mesh share the finer
+    one. Where that has no state, `_coarser_counts` decides which answer stays.
     """
     contrast_sets = compared_sets(scenes)
-    answers: dict[int, Answer] = {}
+    answers: Answers = {}
     best: dict[int, Answer] = {}  # the answer of each scene with the smallest estimate
     failures: dict[int, SolveFailure] = {}  # on finer meshes, of scenes whose coarser answers count
-    work: dict[float | Lines, list[int]] = {FIRST_FINENESS: list(range(len(scenes)))}
-    meshes: dict[int, float | Lines] = {}  # the last mesh of each scene
+    work: dict[Fineness, list[int]] = {FIRST_FINENESS: list(scenes)}
+    meshes: dict[int, Fineness] = {}  # the last mesh of each scene
     while True:
         for mesh, todo in work.items():
-            results = meshing.answers([scenes[i] for i in todo], mesh, _within(watch, todo))
             meshes |= dict.fromkeys(todo, mesh)
-            for i, answer in zip(todo, results, strict=True):
+            for i, answer in meshing.answers({i: scenes[i] for i in todo}, mesh, watch).items():
                 failure = _loss(answer, answers.get(i))
                 if failure is not None:
                     failures[i] = failure
@@ -217,18 +191,17 @@ def _refine(scenes: list[Scene], meshing: Meshing, watch: Watch | None, rough: R
         for answer in answers.values():
             if rough is not None and isinstance(answer, Prediction):
                 rough(answer)
-    answers |= {i: best[i] for i, miss in enumerate(errors) if miss > 1.0}
-    if scenes[0].solve.kinematics == "finite":  # where a fine mesh may miss the state
+    answers |= {i: best[i] for i, miss in errors.items() if miss > 1.0}
+    if isinstance(meshing, FiniteMeshing):  # where a fine mesh may miss the state
         failures |= _fall_back(scenes, answers, meshing)
     contrast_of = {i: contrast for together, contrast in zip(contrast_sets, contrasts, strict=True) for i in together}
     errors = _errors(answers, failures, meshes)
-    warnings = [_sentences(contrast_of.get(i), errors[i], answers[i], failures.get(i)) for i in range(len(scenes))]
-    return _Refinement([answers[i] for i in range(len(scenes))], warnings)
+    return answers, {i: _sentences(contrast_of.get(i), errors[i], answers[i], failures.get(i)) for i in scenes}
 
 
 def _error_reductions(
-    scenes: Sequence[Scene],
-    errors: Sequence[float],
+    scenes: Scenes,
+    errors: Mapping[int, float],
     contrast_sets: Sequence[Sequence[int]],
     contrasts: Sequence[ContrastError],
 ) -> dict[int, float]:
@@ -237,7 +210,7 @@ def _error_reductions(
     `errors` are those of all scenes relative to their tolerances, `contrasts` those of differences within each of
     `contrast_sets`. Surfaces that are compared are refined together.
     """
-    out = {i: miss for i, miss in enumerate(errors) if miss > 1.0}
+    out = {i: miss for i, miss in errors.items() if miss > 1.0}
     for together, contrast in zip(contrast_sets, contrasts, strict=True):
         tolerance = min((t for i in together if (t := scenes[i].solve.contrast_tolerance)), default=np.inf)
         if tolerance < np.inf and (contrast.share > tolerance or any(i in out for i in together)):
@@ -245,7 +218,7 @@ def _error_reductions(
     return out
 
 
-def _finer(answers: Mapping[int, Answer], reductions: Mapping[int, float]) -> dict[float | Lines, list[int]]:
+def _finer(answers: Answers, reductions: Mapping[int, float]) -> dict[Fineness, list[int]]:
     """Return the scenes to solve again, grouped by the finer mesh that they need; empty where no mesh may be finer.
 
     The errors of these `answers` must fall by the factors `reductions`. Scenes that share a mesh share the finer one. A
@@ -254,9 +227,9 @@ def _finer(answers: Mapping[int, Answer], reductions: Mapping[int, float]) -> di
     members: dict[FingerMesh | None, list[int]] = {}
     for i, answer in answers.items():
         members.setdefault(answer.geometry if isinstance(answer, Prediction) else None, []).append(i)
-    out: dict[float | Lines, list[int]] = {}
+    out: dict[Fineness, list[int]] = {}
     for mesh, together in members.items():
-        finer: float | Lines | None = LIMIT_FINENESS
+        finer: Fineness | None = LIMIT_FINENESS
         if mesh is not None:
             nested = [(reductions[i], answer.nested) for i in together if isinstance(answer := answers[i], Prediction)]
             with_nested = [(miss, numbers.shares) for miss, numbers in nested if numbers is not None]
@@ -267,19 +240,19 @@ def _finer(answers: Mapping[int, Answer], reductions: Mapping[int, float]) -> di
     return out
 
 
-def _fall_back(scenes: list[Scene], answers: dict[int, Answer], meshing: Meshing) -> dict[int, SolveFailure]:
+def _fall_back(scenes: Scenes, answers: Answers, meshing: Meshing) -> dict[int, SolveFailure]:
     """Solve scenes without a state on a coarser mesh than the first; return the failures that this replaces.
 
     Under steep friction a single mesh may have no state by chance, so a slightly finer one is tried last.
     """
     failures: dict[int, SolveFailure] = {}
-    for i, scene in enumerate(scenes):
+    for i, scene in scenes.items():
         if isinstance(failure := answers[i], SolveFailure) and _is_doubtful(scene, failure):
-            answer = meshing.answers([scene], FIRST_FINENESS / FINENESS_RATIO)[0]
+            answer = meshing.answers({i: scene}, FIRST_FINENESS / FINENESS_RATIO)[i]
             if _coarser_counts(answer, failure):
                 answers[i], failures[i] = answer, failure
         if isinstance(answers[i], NotConverged) and scene.friction.mu > SHEAR_LIMITED_MU:
-            answers[i] = meshing.answers([scene], FIRST_FINENESS * FINENESS_RATIO)[0]
+            answers[i] = meshing.answers({i: scene}, FIRST_FINENESS * FINENESS_RATIO)[i]
     return failures
 
 
@@ -346,14 +319,12 @@ def _add_warnings(answer: Answer, sentences: tuple[str, ...]) -> Answer:
     )
 
 
-def _errors(
-    answers: Mapping[int, Answer], failures: Mapping[int, SolveFailure], meshes: Mapping[int, float | Lines]
-) -> list[float]:
+def _errors(answers: Answers, failures: Mapping[int, SolveFailure], meshes: Mapping[int, Fineness]) -> dict[int, float]:
     """Return the errors of all answers relative to their tolerances, 0 for coarser answers in place of `failures`."""
-    return [
-        0.0 if i in failures else _error_by_tolerance(answers[i], on_first=meshes[i] == FIRST_FINENESS)
-        for i in sorted(answers)
-    ]
+    return {
+        i: 0.0 if i in failures else _error_by_tolerance(answer, on_first=meshes[i] == FIRST_FINENESS)
+        for i, answer in answers.items()
+    }
 
 
 def _error_by_tolerance(answer: Answer, *, on_first: bool) -> float:

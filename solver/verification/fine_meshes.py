@@ -91,7 +91,7 @@ def _finite(scenes: Sequence[Scene], fineness: float, shift: bool, step_factor: 
     meshes, depth = Meshes(), max(expected_depth(scene) for scene in scenes)
     for scene in scenes:
         low = coarse_solution(scene, depth, FIRST_FINENESS, meshes)
-        sizing = replace(low.sizing, fineness=fineness, shift=shift)
+        sizing = replace(low.finger.geometry.sizing, fineness=fineness, shift=shift)
         if scene.viscoelastic and depends_on_way(scene):
             finger = meshes.finger(scene, replace(sizing, margin=WIDER))
             yield np.abs(finger.numbers([end_of_path(scene, finger, step_factor)])[0])

@@ -54,7 +54,7 @@ def test_under_steep_friction_a_mesh_that_is_tried_at_last_says_that_it_misses_t
 
     refined = replace(coarse_prediction, scene=strict)
     failure = NotConverged("lost")
-    monkeypatch.setattr(FiniteMeshing, "answers", lambda *args: [refined if args[2] == 4.0 * 1.2 else failure])
+    monkeypatch.setattr(FiniteMeshing, "answers", lambda *args: {0: refined if args[2] == 4.0 * 1.2 else failure})
     prediction = solve(strict)
     assert prediction.error_estimate > 1e-4
     assert any("above the tolerance" in warning for warning in prediction.warnings)

@@ -45,8 +45,8 @@ def test_variants_of_one_surface_and_surfaces_pressed_otherwise_are_not_told_apa
     first, second = scene(STICKINESS[0]), scene(STICKINESS[2])
     deeper = replace(second, loading=Loading(1.0, "+x"))
     variant = replace(second, solve=Solve(evidence="quick"))
-    assert compared_sets([first, deeper, variant, second]) == [[0, 3]]
-    assert compared_sets([first, deeper, variant, first]) == []
+    assert compared_sets(dict(enumerate([first, deeper, variant, second]))) == [[0, 3]]
+    assert compared_sets(dict(enumerate([first, deeper, variant, first]))) == []
 
 
 # Three surfaces for one finger, whose normal forces (finite strain) or SED (small) differ by 2 and 0.6 %: indentation,

@@ -23,7 +23,7 @@ SLOW = pytest.mark.slow
 def refine_from_coarse(scene, depth, fineness):
     """Return the state of a scene on a mesh of `fineness`, begun on a coarse one."""
     meshes = Meshes()
-    return refine(scene, fineness, coarse_solution(scene, depth, fineness, meshes), meshes).top
+    return refine(scene, fineness, coarse_solution(scene, depth, fineness, meshes), meshes)[0]
 
 
 @pytest.mark.slow

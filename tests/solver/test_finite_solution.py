@@ -117,7 +117,7 @@ def test_a_surface_begun_at_anothers_state_ends_where_one_begun_at_the_undeforme
     coarse_solution(first, 1.5, 4.0, common)
     lows = [coarse_solution(second, 1.5, 4.0, meshes) for meshes in (common, own)]
     assert lows[0].state.iterations < lows[1].state.iterations
-    tops = [refine(second, 6.0, low, meshes).top.state for low, meshes in zip(lows, (common, own), strict=True)]
+    tops = [refine(second, 6.0, low, meshes)[0].state for low, meshes in zip(lows, (common, own), strict=True)]
     np.testing.assert_allclose(tops[0].u, tops[1].u, rtol=0.0, atol=1e-10)
     np.testing.assert_allclose(tops[0].reaction, tops[1].reaction, rtol=0.0, atol=1e-11)
 

@@ -32,7 +32,8 @@ def end_refinement(monkeypatch, finer, *, error=None):
 
     def answers(self, scenes, fineness, watch=None):
         finenesses.append(fineness)
-        return [finer] * len(scenes) if isinstance(fineness, Lines) else coarse_answers(self, scenes, fineness, watch)
+        is_finer = isinstance(fineness, Lines)
+        return dict.fromkeys(scenes, finer) if is_finer else coarse_answers(self, scenes, fineness, watch)
 
     monkeypatch.setattr(FiniteMeshing, "answers", answers)
     if error is not None:
