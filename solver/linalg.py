@@ -250,7 +250,6 @@ class Elimination:
     """Elimination of one body's tangent down to its skin, and the memory for it."""
 
     def __init__(self, plan: SymbolicFactorization) -> None:
-        """Allocate memory for `plan`."""
         skin = int(plan.border[-1])
         self.plan = plan
         self.stiffness = np.zeros((skin, skin))  # the tangent's Schur complement

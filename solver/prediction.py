@@ -10,7 +10,7 @@ from solver.arrays import Array, Indices
 from solver.failures import SolveFailure
 from solver.mesh import Mesh
 from solver.mesh.mesher import FingerMesh
-from solver.quantities import NAMES, QUANTITIES, SED
+from solver.quantities import NAMES, QUANTITIES
 from solver.scene import Scene
 
 FORCES_AND_PLACES = 7  # results with an error estimate besides the quantities; they come first in `all_numbers`
@@ -68,13 +68,6 @@ class History:
     contact_width: Array  # (m,) [mm]
     slipping: Array  # (m,) part of the touching skin nodes that slip [-]
     responses: Array  # (m, q) all quantities at the ending; nan for all but the SED where tissues relax
-
-
-def sed_alone(sed: Array) -> Array:
-    """Return responses (m, q) with the SED (m,), nan for all other quantities."""
-    out = np.full((len(sed), len(NAMES)), np.nan)
-    out[:, NAMES.index(SED.name)] = sed
-    return out
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -137,23 +137,16 @@ def _finite_volumetric(local: LocalState) -> Array:
 
 SED = Quantity("sed", "SED", "MPa", "strain-energy density", _small_energy, _finite_energy, signed=False)
 VOLUMETRIC = Quantity(
-    "sed_volumetric",
-    "SED of volume",
-    "MPa",
+    "sed_volumetric", "SED of volume", "MPa",
     "strain-energy density of the same change of volume, alike in all directions",
-    _small_volumetric,
-    _finite_volumetric,
-    signed=False,
-)
+    _small_volumetric, _finite_volumetric, signed=False,
+)  # fmt: skip
 DEVIATORIC = Quantity(
-    "sed_deviatoric",
-    "SED of shape",
-    "MPa",
-    "strain-energy density less that of the change of volume",
+    "sed_deviatoric", "SED of shape", "MPa", "strain-energy density less that of the change of volume",
     lambda local: _small_energy(local) - _small_volumetric(local),
     lambda local: _finite_energy(local) - _finite_volumetric(local),
     signed=False,
-)
+)  # fmt: skip
 
 
 def _small_radius(local: LocalState) -> Array:
@@ -208,47 +201,29 @@ def _size(number: Array) -> Array:
 
 
 GREATEST_STRAIN = Quantity(
-    "principal_strain_greatest",
-    "greatest principal strain",
-    "-",
-    "greatest principal stretch in the plane, less one",
+    "principal_strain_greatest", "greatest principal strain", "-", "greatest principal stretch in the plane, less one",
     lambda local: local.trace / 2.0 + _small_radius(local),
     lambda local: (_finite_sum(local) + _finite_difference(local)) / 2.0 - 1.0,
-)
+)  # fmt: skip
 LEAST_STRAIN = Quantity(
-    "principal_strain_least",
-    "least principal strain",
-    "-",
-    "least principal stretch in the plane, less one",
+    "principal_strain_least", "least principal strain", "-", "least principal stretch in the plane, less one",
     lambda local: local.trace / 2.0 - _small_radius(local),
     lambda local: (_finite_sum(local) - _finite_difference(local)) / 2.0 - 1.0,
-)
+)  # fmt: skip
 SHEAR = Quantity(
-    "shear_greatest",
-    "greatest shear",
-    "-",
+    "shear_greatest", "greatest shear", "-",
     "difference of the principal stretches in the plane: the greatest engineering shear at small strain",
-    lambda local: 2.0 * _small_radius(local),
-    _finite_difference,
-    signed=False,
-)
+    lambda local: 2.0 * _small_radius(local), _finite_difference, signed=False,
+)  # fmt: skip
 SHEAR_ALONG = Quantity(
-    "shear_along_skin",
-    "shear along the skin",
-    "-",
+    "shear_along_skin", "shear along the skin", "-",
     "size of the tangent of the angle by which skin's tangent and normal leave their right angle",
-    _small_shear_along,
-    _finite_shear_along,
-    signed=False,
-)
+    _small_shear_along, _finite_shear_along, signed=False,
+)  # fmt: skip
 STRETCH_ALONG = Quantity(
-    "stretch_along_skin",
-    "stretch along the skin",
-    "-",
-    "stretch of a line along the skin at rest, less one",
-    _small_along,
-    _finite_along,
-)
+    "stretch_along_skin", "stretch along the skin", "-", "stretch of a line along the skin at rest, less one",
+    _small_along, _finite_along,
+)  # fmt: skip
 
 
 def _pressure(stress: Stress) -> Array:
@@ -301,17 +276,8 @@ LEAST_STRESS = _stress_quantity(
 )
 
 QUANTITIES = (
-    SED,
-    DEVIATORIC,
-    VOLUMETRIC,
-    GREATEST_STRAIN,
-    LEAST_STRAIN,
-    SHEAR,
-    SHEAR_ALONG,
-    STRETCH_ALONG,
-    PRESSURE,
-    VON_MISES,
-)
+    SED, DEVIATORIC, VOLUMETRIC, GREATEST_STRAIN, LEAST_STRAIN, SHEAR, SHEAR_ALONG, STRETCH_ALONG, PRESSURE, VON_MISES,
+)  # fmt: skip
 NAMES: tuple[str, ...] = tuple(quantity.name for quantity in QUANTITIES)
 # Quantities in pictures of the tissue. Principal stresses are only shown: no receptor is said to respond to them.
 FIELDS = (SED, GREATEST_STRAIN, LEAST_STRAIN, GREATEST_STRESS, LEAST_STRESS, VON_MISES, PRESSURE)

@@ -23,7 +23,6 @@ class _Compilation(events.Listener):
     """
 
     def __init__(self) -> None:
-        """Start with no compilation in progress."""
         self._count = 0
         self._open: ExitStack | None = None
         self._loop: object = None

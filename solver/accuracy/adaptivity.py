@@ -137,7 +137,7 @@ def with_shares(
         return on_nested
     nested, finger, state = on_nested
     target = scene.solve.target
-    misses_tolerance = target is not None and errors(scene, numbers, nested, steps).sed > target
+    misses_tolerance = target is not None and errors(scene, numbers, nested, steps).error_estimate > target
     if not misses_tolerance and scene.solve.contrast_tolerance is None:
         return nested
     parts = np.concatenate(_grid(finger).parts(finger.displacement(state), state))

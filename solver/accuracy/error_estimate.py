@@ -116,17 +116,17 @@ class Steps:
 
 
 class Errors(NamedTuple):
-    """Error estimates, relative except for the shift; None for results that are given or do not exist."""
+    """Error estimates, by the fields of `Prediction`; None for results that are given or do not exist."""
 
-    sed: float
-    corrected: float  # of the SED on the nested mesh
-    normal: float | None
-    tangential: float | None  # 0 without friction
-    indentation: float | None
-    shift: float | None  # [mm]
-    width: float | None  # of the contact
-    point: float  # of the SED at the ending's middle
-    responses: Array  # (q,) of each quantity at the ending, in the quantity's unit; nan where unknown
+    error_estimate: float
+    corrected_error: float
+    sed_point_error: float
+    normal_force_error: float | None
+    tangential_force_error: float | None
+    indentation_error: float | None
+    shift_error: float | None
+    contact_width_error: float | None
+    responses: Mapping[str, Response]
 
 
 def edge_changes(
@@ -227,24 +227,28 @@ def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: St
     of a state that depends on its load path.
     """
     if nested is None:
-        return _without_prescribed(scene, Errors(1.0, 1.0, 1.0, 1.0, 1.0, None, 1.0, 1.0, np.full(len(NAMES), np.nan)))
-    change = nested.numbers - numbers
-    error = half_width(change, nested.edge_changes, nested.order, _edge_shares(nested.order))
-    if steps is not None:
-        error += steps.error
-    relative = error / np.maximum(np.abs(numbers), np.finfo(float).tiny)
+        error, relative, corrected = np.full(COUNT, np.nan), np.ones(COUNT), 1.0
+    else:
+        change = nested.numbers - numbers
+        error = half_width(change, nested.edge_changes, nested.order, _edge_shares(nested.order))
+        if steps is not None:
+            error += steps.error
+        relative = error / np.maximum(np.abs(numbers), np.finfo(float).tiny)
+        corrected = float(error[0] - abs(change[0])) / max(abs(float(nested.numbers[0])), np.finfo(float).tiny)
     sed, normal, tangential, depth, _, width, point = relative[:FORCES_AND_PLACES].tolist()
-    corrected = float(error[0] - abs(change[0])) / max(abs(float(nested.numbers[0])), np.finfo(float).tiny)
-    of_quantities = error[FORCES_AND_PLACES:]
-    return _without_prescribed(
-        scene, Errors(sed, corrected, normal, tangential, depth, float(error[SHIFT]), width, point, of_quantities)
+    by_force, by_drag = scene.normal_force is not None, scene.loading.dragged
+    quantities = np.stack([numbers, error], axis=1)[FORCES_AND_PLACES:].tolist()
+    return Errors(
+        error_estimate=sed,
+        corrected_error=corrected,
+        sed_point_error=point,
+        normal_force_error=None if by_force else normal,
+        tangential_force_error=None if by_drag else 0.0 if scene.friction.frictionless else tangential,
+        indentation_error=depth if by_force else None,
+        shift_error=float(error[SHIFT]) if by_drag and nested is not None else None,
+        contact_width_error=width,
+        responses={name: Response(*row) for name, row in zip(NAMES, quantities, strict=True)},
     )
-
-
-def responses(numbers: Array, errors: Errors) -> dict[str, Response]:
-    """Return the quantities at the ending among `numbers` (COUNT,), each with its error, by name."""
-    pairs = zip(NAMES, numbers[FORCES_AND_PLACES:].tolist(), errors.responses.tolist(), strict=True)
-    return {name: Response(value, error) for name, value, error in pairs}
 
 
 def row_errors(row: Array, nested: NestedNumbers | None) -> Array:
@@ -253,18 +257,6 @@ def row_errors(row: Array, nested: NestedNumbers | None) -> Array:
         return np.full(len(row), np.nan)
     error = half_width(nested.row - row, nested.row_edge_changes, nested.order)
     return error / np.maximum(row, np.finfo(float).tiny)
-
-
-def _without_prescribed(scene: Scene, estimates: Errors) -> Errors:
-    """Return the errors, None for prescribed results and 0 for the drag without friction."""
-    by_force, by_drag = scene.normal_force is not None, scene.loading.dragged
-    rubs = not scene.friction.frictionless
-    return estimates._replace(
-        normal=None if by_force else estimates.normal,
-        tangential=None if by_drag else estimates.tangential if rubs else 0.0,
-        indentation=estimates.indentation if by_force else None,
-        shift=estimates.shift if by_drag else None,
-    )
 
 
 COMPARED = ("SED", "normal force", "drag", "indentation")  # the first four of `all_numbers`

@@ -47,11 +47,11 @@ class CondensedBody(Protocol):
     def skin_positions(self, u: Array) -> Array:
         """Return the positions of the skin's nodes (k, 2) at displacements `u` [mm]."""
 
-    def linearise(self, u: Array, pressure: Array) -> bool:
-        """Set `stiffness` and `force` at a state; return False where the state is inside out or singular."""
+    def linearise(self, u: Array, pressure: Array | None) -> bool:
+        """Set `stiffness` and `force` at a state; return False where the state is inside out or singular.
 
-    def relinearise(self, u: Array) -> bool:
-        """Set `force` at a state and keep the stiffness; return False where the state is inside out."""
+        Without `pressure`, the last stiffness is kept.
+        """
 
     def recover(self, u: Array, pressure: Array, step: Array, scale: float) -> tuple[Array, Array, float]:
         """Return a state after `scale` times the skin's `step` (2 k,), and the largest move of the full step [mm]."""
@@ -113,16 +113,10 @@ class CondensedLinear:
         self.springs = self.motions  # an orthonormal basis of all rigid motions that no support prevents
         self.force = -load
         self.equilibrium: Array | None = None
-        self._compliance: Array | None = None
 
-    @property
+    @cached_property
     def compliance(self) -> Array:
         """The bordered inverse of `CondensedBody`, 0 for held unknowns. Raises LinAlgError for a singular stiffness."""
-        if self._compliance is None:
-            self._compliance = self._inverse()
-        return self._compliance
-
-    def _inverse(self) -> Array:
         free, count = np.flatnonzero(self.stiffness.diagonal() > 0.0), self.motions.shape[1]
         # Rigid motions store no energy, so a spring on each makes the matrix invertible. The springs stay unloaded,
         # because the surface's forces balance the loads along every motion.
@@ -137,15 +131,11 @@ class CondensedLinear:
         out[np.ix_(free, free)] = (inverse + inverse.T) / 2.0
         return out
 
-    def _displacement_by(self, forces: Array) -> Array:
-        """Return the displacements (k, 2) under `forces` (2 k,) on the skin."""
-        size = len(forces)
-        return (self.compliance[:size, :size] @ forces).reshape(-1, 2)
-
     def with_load(self, load: Array) -> "CondensedLinear":
         """Return the same body under another dead `load` (2 k,) [N/mm]."""
+        _ = self.compliance  # which both share
         body = copy(self)
-        body.load, body.force, body._compliance = load, -load, self.compliance  # noqa: SLF001 - same class
+        body.load, body.force = load, -load
         return body
 
     def undeformed(self) -> tuple[Array, Array]:
@@ -154,11 +144,12 @@ class CondensedLinear:
 
     def free_displacement(self) -> Array:
         """Return the displacements (k, 2) under the dead loads alone, without free rigid motions."""
-        return self._displacement_by(self.load)
+        return self.displacement_under(np.zeros(self.rest.shape))
 
     def displacement_under(self, reaction: Array) -> Array:
         """Return the displacements (k, 2) under the dead loads and forces `reaction` (k, 2) of the surface."""
-        return self._displacement_by(self.load + reaction.ravel())
+        size = len(self.load)
+        return (self.compliance[:size, :size] @ (self.load + reaction.ravel())).reshape(-1, 2)
 
     def stored_energy(self, u: Array, reaction: Array) -> float:  # noqa: ARG002 - `u` of relaxing tissues may differ
         """Return the energy stored once the body is relaxed under forces `reaction` (k, 2) [N mm per mm]."""
@@ -172,12 +163,8 @@ class CondensedLinear:
         """Return the positions of the skin's nodes (k, 2) at displacements `u` (k, 2) [mm]."""
         return self.rest + u
 
-    def linearise(self, u: Array, pressure: Array) -> bool:  # noqa: ARG002 - part of the protocol
+    def linearise(self, u: Array, pressure: Array | None) -> bool:  # noqa: ARG002 - part of the protocol
         """Set `force` at a state; the stiffness is constant."""
-        return self.relinearise(u)
-
-    def relinearise(self, u: Array) -> bool:
-        """Set `force` at a state."""
         self.force = self.stiffness @ u.ravel() - self.load if u.any() else -self.load
         return True
 
@@ -236,9 +223,6 @@ class Endings:
         out = np.full((self.count, *values.shape[1:]), np.nan, values.dtype)
         out[self.patch[first]] = np.add.reduceat(values * self.weights[wide], first, axis=0)
         return out / self.areas[wide]
-
-
-VALUES = Q2P1.shape(Q2P1.points)[0]  # (9 points, 9 nodes)
 
 
 class ProbeData(NamedTuple):

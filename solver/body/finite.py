@@ -47,13 +47,9 @@ class FiniteBody(MeshElements):
         middle = (np.arange(len(mesh.skin)) % 2).astype(np.int32)
         return cls(*integrate_elements(mesh, materials, plan.unknown), plan, held_directions(mesh), middle)
 
-    @property
+    @cached_property
     def condensed(self) -> "CondensedFinite":
         """The body's tangent, condensed to the skin."""
-        return self._condensed
-
-    @cached_property
-    def _condensed(self) -> "CondensedFinite":
         return CondensedFinite(self)
 
     @property
@@ -195,36 +191,27 @@ class CondensedFinite:
         skin = self.body.mesh.skin
         return self.body.mesh.nodes[skin] + u[skin]
 
-    def linearise(self, u: Array, pressure: Array) -> bool:
-        """Assemble and factorise the tangent at a state; return False where it is inside out or singular."""
-        self.equilibrium = None
+    def linearise(self, u: Array, pressure: Array | None) -> bool:
+        """Condense the tangent and the forces at a state; return False where it is inside out or singular.
+
+        Without `pressure`, the last tangent and its factors are kept.
+        """
+        if pressure is not None:
+            self.equilibrium = None
         if not self.assemble(u, pressure) > 0.0:
             return False
-        result = self.inside.factorise(self.system.tangent)
-        self.definite = result == DEFINITE
-        if result == UNSOLVABLE:
-            return False
-        self._condense()
-        return True
-
-    def relinearise(self, u: Array) -> bool:
-        """Condense the forces at a state with the last factors; return False where it is inside out."""
-        if not self.assemble_forces(u) > 0.0:
-            return False
-        self._condense()
-        return True
-
-    def _condense(self) -> None:
+        if pressure is not None:
+            result = self.inside.factorise(self.system.tangent)
+            self.definite = result == DEFINITE
+            if result == UNSOLVABLE:
+                return False
         self.all_forces -= self.load
         self.inside.condense(self.all_forces)
+        return True
 
-    def assemble(self, u: Array, pressure: Array) -> float:
-        """Fill tangents and forces at a state and return the smallest det F."""
-        return self._assemble(u, pressure, True)
-
-    def assemble_forces(self, u: Array) -> float:
-        """Fill the forces at a state, keep the tangent, and return the smallest det F."""
-        return self._assemble(u, self._no_pressure, False)
+    def assemble(self, u: Array, pressure: Array | None) -> float:
+        """Fill tangents and forces at a state, without `pressure` the forces alone; return the smallest det F."""
+        return self._assemble(u, self._no_pressure if pressure is None else pressure, pressure is not None)
 
     def recover(self, u: Array, pressure: Array, step: Array, scale: float) -> tuple[Array, Array, float]:
         """Return a state after `scale` times the skin's `step` (2 k,), and the largest move of the full step [mm]."""

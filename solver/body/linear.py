@@ -66,17 +66,13 @@ class LinearElimination:
         plan = symbolic_factorization(mesh)
         self.elastic = Elastic(*integrate_elements(mesh, materials, plan.unknown))
         count = len(mesh.elements)
-        still, self._inverse, self._recovery_matrix = (
-            np.zeros(mesh.nodes.shape),
-            np.zeros((count, 3)),
-            np.zeros((count, 2, 17)),
-        )
+        self._inverse, self._recovery_matrix = np.zeros((count, 3)), np.zeros((count, 2, 17))
         self._inside = Elimination(plan)
         system = ElementSystem(
             np.empty((count, 16, 16)), np.zeros(plan.size), self._recovery_matrix, self._inverse,
             np.empty((count, 3, 18)), np.empty((count, 3)), np.zeros((0, 18)), np.zeros((0, 18, 18)),
         )  # fmt: skip
-        element_loops.assemble(still, np.zeros((count, 3)), True, self.elastic.elements, system)
+        element_loops.assemble(np.zeros(mesh.nodes.shape), np.zeros((count, 3)), True, self.elastic.elements, system)
         if self._inside.factorise(system.tangent) != DEFINITE:
             raise LinAlgError("the stiffness inside the body is not positive definite")
         self._recovery_matrix = self._recovery_matrix[:, :, :16].copy()
@@ -305,9 +301,8 @@ class LinearPatches(Patches):
         form[:, :, 1, :, 0], form[:, :, 1, :, 1] = np.swapaxes(yx, 1, 2) / 2.0, yy + xx / 2.0
         theta = np.swapaxes(self.elements.combination[element], 1, 2) @ self.elements.divergence[element]  # on 1, x, y
         volume = np.swapaxes(theta, 1, 2) @ sums[:, 18:, 18:] @ theta
-        shear, lame = (
-            modulus[element, None, None] for modulus in (self.elements.elements.shear, self.elements.elements.lame)
-        )
+        moduli = self.elements.elements
+        shear, lame = moduli.shear[element, None, None], moduli.lame[element, None, None]
         # W = G eps:eps + lambda/2 theta^2
         return element, patch[first], shear * form.reshape(-1, 18, 18) + lame / 2.0 * volume
 

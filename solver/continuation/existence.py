@@ -22,12 +22,7 @@ AGREEMENT = 0.1  # relative difference of SED and forces below which states of t
 BEYOND_LIMIT = 0.06  # relative distance beyond a limit at which another path is tried: twice the 3 % accuracy of limits
 
 
-def slide_on_branch(
-    finger: FiniteFinger,
-    load: LoadState,
-    tolerance: float = TO_ROUND_OFF.tolerance,
-    start: EquilibriumState | None = None,
-) -> EquilibriumState:
+def slide_on_branch(finger: FiniteFinger, load: LoadState, start: EquilibriumState | None = None) -> EquilibriumState:
     """Return full slip under `load` on the branch from the frictionless state or from a shallow press.
 
     The search begins at `start`. A state whose skin might have folded, or that is not found directly, is proven by
@@ -35,7 +30,7 @@ def slide_on_branch(
     `load`, NotConverged where it has no first state, Cancelled.
     """
     candidates: list[EquilibriumState] = []
-    for state in _direct_states(finger.newton, load, tolerance, start):
+    for state in _direct_states(finger.newton, load, start):
         if is_sound(finger, state, LIMIT.safe_stretch):
             return state
         candidates.append(state)
@@ -54,7 +49,7 @@ def slide_on_branch(
         )
     branch = Continuation(finger, proof.search.parameter, 0.0).trace(proof.search.start(finger), proof.search.target)
     if not branch.ends_early:
-        state = solve_full_slip(finger.newton, load, branch.last, tolerance)
+        state = solve_full_slip(finger.newton, load, branch.last)
         if _agrees(finger, state, proof):
             return state
     limit = "depth" if proof.by_depth else "friction"
@@ -91,20 +86,18 @@ def refuse_far_beyond(scene: Scene, load: LoadState) -> None:
             raise _no_slide(scene, load, proof)
 
 
-def _direct_states(
-    newton: Newton, load: LoadState, tolerance: float, start: EquilibriumState | None
-) -> Iterator[EquilibriumState]:
+def _direct_states(newton: Newton, load: LoadState, start: EquilibriumState | None) -> Iterator[EquilibriumState]:
     """Yield the states found directly from `start`, from the undeformed state, and from shear-limited skin.
 
     Where nearly all skin is shear-limited, the undeformed state leads to no further state.
     """
     ways: list[Callable[[], EquilibriumState]] = []
     if not is_mostly_shear_limited(load):
-        ways.append(lambda: solve_full_slip(newton, load, None, tolerance))
+        ways.append(lambda: solve_full_slip(newton, load))
     if load.tau < np.inf:
-        ways.append(lambda: slide_from_limited_skin(newton, load, tolerance))
+        ways.append(lambda: slide_from_limited_skin(newton, load))
     if start is not None:
-        ways.insert(0, lambda: solve_full_slip(newton, load, start, tolerance))
+        ways.insert(0, lambda: solve_full_slip(newton, load, start))
     for search in ways:
         with suppress(NotConverged):
             yield search()
@@ -216,7 +209,9 @@ def _agrees(finger: FiniteFinger, state: EquilibriumState, proof: ContinuationLi
     return bool(np.all(np.abs(change) <= AGREEMENT * size))
 
 
-def slide_from_limited_skin(newton: Newton, load: LoadState, tolerance: float) -> EquilibriumState:
+def slide_from_limited_skin(
+    newton: Newton, load: LoadState, tolerance: float = TO_ROUND_OFF.tolerance
+) -> EquilibriumState:
     """Return full slip from the frictionless state, with all its contact shear-limited under a growing bound.
 
     Under a low bound and a large mu, skin is shear-limited even at small pressures, so that slip is a bad first guess.

@@ -101,16 +101,12 @@ def _state_under_force(
     finger: FiniteFinger, scene: Scene, force: float, start: EquilibriumState | None, step_factor: float
 ) -> EquilibriumState:
     """Return the settled state under given forces, with unknown depth and travel. Raises as `settled_state`."""
-
-    def hold() -> EquilibriumState:
-        return march_scene(scene, finger, step_factor).last
-
     if start is not None and start.load.sense == 0:  # the end of a load path, no start for a slide
         start = None
         with suppress(NotConverged):
-            return hold()
+            return march_scene(scene, finger, step_factor).last
     try:
-        return slide_or_hold(scene, lambda: _sliding_under(finger, scene, force, start), hold)
+        return slide_or_hold(scene, finger, lambda: _sliding_under(finger, scene, force, start), step_factor)
     except NoSteadyState as failure:
         raise failure if scene.loading.dragged else _under_force(scene, force, failure) from failure
 

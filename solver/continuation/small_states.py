@@ -8,14 +8,16 @@ surface. The limit is found by following full slip from mu = 0.
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cache
 from math import log2, sqrt
+from typing import Any
 
 import numpy as np
 
 from solver.arrays import Array
 from solver.contact import LoadState
 from solver.equilibrium import EquilibriumState, Newton
-from solver.equilibrium.finger import LinearFinger, cached_finger
+from solver.equilibrium.finger import Finger, LinearFinger, cached_finger
 from solver.equilibrium.load_path import march_scene, slide_or_hold
 from solver.equilibrium.load_stepping import forces_of, slide_from_guess, slide_under, sliding_load
 from solver.equilibrium.load_stepping import solve_full_slip as full_slip
@@ -79,48 +81,40 @@ def continue_in_friction(
     return None, 0.0 if unknown else mu
 
 
-class FingerCache:
-    """A cache of one finger on meshes for depths around powers of two."""
-
-    def __init__(self, scene: Scene) -> None:
-        """Start empty."""
-        self._scene = scene
-        self._by_power: dict[int, Newton] = {}
-
-    def at(self, depth: float) -> Newton:
-        """Return a body whose mesh is made for a depth within a factor of 1.4 of `depth` [mm]."""
-        power = round(log2(depth))
-        if power not in self._by_power:
-            self._by_power[power] = self.build_for(2.0**power, _FINENESS)
-        return self._by_power[power]
-
-    def build_for(self, depth: float, fineness: float) -> Newton:
-        """Return a body with a new mesh."""
-        return LinearFinger.of(self._scene, Sizing(fineness, depth, margin=WIDE_MARGIN)).newton
-
-
 def limits(scene: Scene, load: LoadState) -> tuple[float | None, float | None]:
     """Return the largest normal force [N/mm] and depth [mm] with full slip under `load`, to 3 and 4 %.
 
     Both are less than the scene's. The force is None where the scene prescribes a depth; unknown limits are None.
     """
-    bodies = FingerCache(scene)
+
+    @cache
+    def newton_for(depth: float, fineness_ratio: float = 1.0) -> Newton:
+        return LinearFinger.of(scene, Sizing(fineness_ratio * _FINENESS, depth, margin=WIDE_MARGIN)).newton
+
     if scene.normal_force is None:
-        return None, _deepest(bodies, load, scene.loading.depth)
-    strongest = _strongest(bodies, scene, scene.normal_force, load)
+        return None, _deepest(newton_for, load, scene.loading.depth)
+    strongest = _strongest(newton_for, scene, scene.normal_force, load)
     if strongest is None:
         return None, None
-    return strongest[0], _deepest(bodies, load, LIMIT_SEARCH.depth_factor * strongest[1], strongest[1])
+    return strongest[0], _deepest(newton_for, load, LIMIT_SEARCH.depth_factor * strongest[1], strongest[1])
 
 
-def _deepest(bodies: FingerCache, load: LoadState, high: float, low: float | None = None) -> float | None:
+NewtonFor = Callable[..., Newton]  # takes the depth [mm] for which a mesh is made, and a factor on its fineness
+
+
+def _rounded(depth: float) -> float:
+    """Return the power of two next to a `depth`, so that depths within a factor of 1.4 share a mesh."""
+    return 2.0 ** round(log2(depth))
+
+
+def _deepest(newton_for: NewtonFor, load: LoadState, high: float, low: float | None = None) -> float | None:
     """Return the largest indentation [mm] between `low` and `high` with full slip.
 
     None where none has full slip, or where a finer mesh disagrees, as it does at coefficients far beyond the limit.
     """
 
     def slides(depth: float) -> bool:
-        return continue_in_friction(bodies.at(depth), load._replace(depth=depth))[0] is not None
+        return continue_in_friction(newton_for(_rounded(depth)), load._replace(depth=depth))[0] is not None
 
     least = LIMIT_SEARCH.min_fraction * high
     while low is None:
@@ -128,12 +122,12 @@ def _deepest(bodies: FingerCache, load: LoadState, high: float, low: float | Non
             return None
         low, high = (high / 2.0, high) if slides(high / 2.0) else (None, high / 2.0)
     deepest = _largest(slides, low, high)
-    finer = bodies.build_for(deepest, LIMIT_SEARCH.fineness_ratio * _FINENESS)
+    finer = newton_for(deepest, LIMIT_SEARCH.fineness_ratio)
     ends = [continue_in_friction(finer, load._replace(depth=part * deepest))[0] is None for part in (0.97, 1.03)]
     return deepest if ends == [False, True] else None
 
 
-def _strongest(bodies: FingerCache, scene: Scene, force: float, load: LoadState) -> tuple[float | None, float] | None:
+def _strongest(newton_for: NewtonFor, scene: Scene, force: float, load: LoadState) -> tuple[float | None, float] | None:
     """Return the largest normal force [N/mm] below `force` with full slip, and the largest depth [mm] reached.
 
     The force is None where a finer mesh disagrees; the result is None where no force has full slip.
@@ -145,11 +139,11 @@ def _strongest(bodies: FingerCache, scene: Scene, force: float, load: LoadState)
         return continue_in_friction(newton, load, force, slide_under(newton, frictionless, force, bone))[0]
 
     def frictionless_depth(force: float) -> float:
-        return slide_under(bodies.at(bone / 2.0), frictionless, force, bone).load.depth
+        return slide_under(newton_for(_rounded(bone / 2.0)), frictionless, force, bone).load.depth
 
     def slides(force: float) -> bool:
         with suppress(ContactLost):
-            state = slide_at(bodies.at(frictionless_depth(force)), force)
+            state = slide_at(newton_for(_rounded(frictionless_depth(force))), force)
             if state is not None:
                 depths.append(state.load.depth)
             return state is not None
@@ -158,7 +152,7 @@ def _strongest(bodies: FingerCache, scene: Scene, force: float, load: LoadState)
     if not slides(LIMIT_SEARCH.min_fraction * force):
         return None
     most = _largest(slides, LIMIT_SEARCH.min_fraction * force, force)
-    finer = bodies.build_for(frictionless_depth(most), LIMIT_SEARCH.fineness_ratio * _FINENESS)
+    finer = newton_for(frictionless_depth(most), LIMIT_SEARCH.fineness_ratio)
     ends = [slide_at(finer, part * most) is None for part in (0.97, 1.03)]
     return most if ends == [False, True] else None, max(depths)
 
@@ -171,20 +165,17 @@ def _largest(exists: Callable[[float], bool], low: float, high: float) -> float:
     return sqrt(low * high)
 
 
-def settled_state(scene: Scene, finger: LinearFinger, step_factor: float = 1.0) -> EquilibriumState:
+def settled_state(scene: Scene, finger: Finger[Any], step_factor: float = 1.0) -> EquilibriumState:
     """Return the settled state: full slip directly, a path-dependent state in `step_factor` times the usual load steps.
 
     Raises NotConverged, ContactLost where no state was found, NoSteadyState where a drag exceeds the friction limit.
     """
-    load, loading, newton = sliding_load(scene), scene.loading_per_mm, finger.newton
-    if loading.direction == 0 and not load.frictionless:
+    load, force, newton = sliding_load(scene), scene.normal_force, finger.newton
+    if scene.loading.direction == 0 and not load.frictionless:
         return march_scene(scene, finger, step_factor).last
-    if loading.normal_force is None:
+    if force is None:
         return full_slip(newton, load)
-    force, deepest = loading.normal_force, MAX_DEPTH_SHARE * scene.finger.pulp_thickness()
-    return slide_or_hold(
-        scene, lambda: slide_under(newton, load, force, deepest), lambda: march_scene(scene, finger, step_factor).last
-    )
+    return slide_or_hold(scene, finger, lambda: slide_under(newton, load, force, _deepest_press(scene)), step_factor)
 
 
 def follow_friction(scene: Scene, finger: LinearFinger) -> tuple[EquilibriumState | None, float]:
@@ -195,9 +186,8 @@ def follow_friction(scene: Scene, finger: LinearFinger) -> tuple[EquilibriumStat
     load, force = sliding_load(scene), scene.normal_force
     if force is None:
         return continue_in_friction(finger.newton, load)
-    deepest = MAX_DEPTH_SHARE * scene.finger.pulp_thickness()
     try:
-        first = slide_under(finger.newton, load._replace(mu=0.0), force, deepest)
+        first = slide_under(finger.newton, load._replace(mu=0.0), force, _deepest_press(scene))
     except ContactLost:
         return None, 0.0
     state, limit = continue_in_friction(finger.newton, load, force, first)
@@ -328,9 +318,8 @@ def matching_depths(scenes: Sequence[Scene], normal_forces: Sequence[float]) -> 
     """
     if not scenes:
         return ()
-    deepest = MAX_DEPTH_SHARE * scenes[0].finger.pulp_thickness()
-    finger = _coarse_finger(scenes[0], deepest)
-    states = [_rough_slide(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True)]
+    finger = _coarse_finger(scenes[0])
+    states = [_rough_slide(finger, scene, force) for scene, force in zip(scenes, normal_forces, strict=True)]
     return tuple(None if state is None else state.load.depth for state in states)
 
 
@@ -339,20 +328,19 @@ def expected_depth(scene: Scene) -> float:
     force = scene.normal_force
     if force is None:
         return scene.loading.depth
-    deepest = MAX_DEPTH_SHARE * scene.finger.pulp_thickness()
     try:
-        finger = _coarse_finger(scene, deepest)
+        finger = _coarse_finger(scene)
     except (SceneError, NotConverged):  # the solve itself will report it
-        return deepest
-    state = _rough_slide(finger, scene, force, deepest)
+        return _deepest_press(scene)
+    state = _rough_slide(finger, scene, force)
     drag = scene.tangential_force or 0.0
     is_static = scene.loading.direction == 0 or scene.loading.dragged
     if is_static and (state is None or drag < NEAR_SLIDING * abs(state.force[0])):
         # The finger is then about as deep as one that slides under the same drag.
         friction = Friction(min(drag / force, float(scene.friction.mu)), scene.friction.tau_max)
-        state = _rough_slide(finger, replace(scene, friction=friction), force, deepest)
+        state = _rough_slide(finger, replace(scene, friction=friction), force)
     if state is None:
-        return deepest
+        return _deepest_press(scene)
     # A strong drag lifts the bone but brings more skin into contact, which the mesh must cover.
     highest = float(finger.body.condensed.rest[state.touching, 1].max())
     return max(state.load.depth, COVERED_SHARE * highest, SHALLOW)
@@ -383,13 +371,20 @@ def check_depth(scene: Scene, depth: float, most: float | None = None) -> None:
     )
 
 
-def _coarse_finger(scene: Scene, depth: float) -> LinearFinger:
-    """Return the finger of a scene on a coarse mesh for a `depth` [mm]."""
+def _deepest_press(scene: Scene) -> float:
+    """Return the depth [mm] beyond which small strain is meaningless."""
+    return MAX_DEPTH_SHARE * scene.finger.pulp_thickness()
+
+
+def _coarse_finger(scene: Scene) -> LinearFinger:
+    """Return the finger of a scene on a coarse mesh for the deepest press."""
+    depth = _deepest_press(scene)
     return cached_finger(LinearFinger, scene.frictionless_press(depth), Sizing(COARSE_FINENESS, depth))
 
 
-def _rough_slide(finger: LinearFinger, scene: Scene, normal_force: float, deepest: float) -> EquilibriumState | None:
-    """Return full slip under a normal force [N/mm]; None where it is deeper than `deepest` [mm]."""
+def _rough_slide(finger: LinearFinger, scene: Scene, normal_force: float) -> EquilibriumState | None:
+    """Return full slip under a normal force [N/mm]; None where it is too deep."""
+    deepest = _deepest_press(scene)
     try:
         state = slide_under(finger.newton, sliding_load(scene), normal_force, deepest)
     except ContactLost:

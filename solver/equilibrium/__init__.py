@@ -138,7 +138,6 @@ class Newton:
     """Newton's method on one condensed body, with its work arrays."""
 
     def __init__(self, condensed: CondensedBody) -> None:
-        """Allocate work arrays for the skin of a body."""
         skin = len(condensed.held)
         self.condensed = condensed
         self.systems = 0  # tangents assembled so far
@@ -175,7 +174,7 @@ class Newton:
         """
         self.systems += 0 if reuse else 1
         body = self.condensed
-        if not (body.relinearise(state.u) if reuse else body.linearise(state.u, state.pressure)):
+        if not body.linearise(state.u, None if reuse else state.pressure):
             return False
         return self.solve_contact(state, load, anchor, rounds, forces) != SINGULAR
 
@@ -342,7 +341,7 @@ class Newton:
         Under `forces`, depth and travel are unknown. Raises ContactLost, at the latest after `rounds` systems.
         """
         self.systems += 1
-        self.condensed.relinearise(self._rest)  # any state is one step away
+        self.condensed.linearise(self._rest, None)  # any state is one step away
         rounds = CONTROL.max_systems + 4 * len(self.skin_x) if rounds is None else rounds
         count = self.solve_contact(replace(state, u=self._rest), load, anchor, rounds, forces)
         if count == SINGULAR:

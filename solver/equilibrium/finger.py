@@ -17,8 +17,8 @@ from numpy.linalg import LinAlgError
 
 from solver._kernels.compiling import SLIP, STICK
 from solver._kernels.contact_system import tributary
-from solver.arrays import Array, Flags, Indices
-from solver.body import VALUES, Body, Endings, Patches
+from solver.arrays import Array, Indices
+from solver.body import Body, Endings, Patches
 from solver.body.finite import FiniteBody, FinitePatches
 from solver.body.linear import LinearBody, LinearPatches
 from solver.body.receptor import endings, join, middle
@@ -106,10 +106,6 @@ class Finger(ABC, Generic[PatchKind]):
         """Return the SED averaged over the reference ending [MPa] for displacements (nodes, 2)."""
         return float(self.ending.average(displacement)[0])
 
-    def seds(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return the SED averaged over the reference ending and at its midpoint (c, 2) [MPa] of several states."""
-        return self.ending_and_middle(states)[:, 0]
-
     def ending_and_middle(self, states: Sequence[EquilibriumState]) -> Array:
         """Return every quantity at the reference ending and at its midpoint (c, q, 2) of several states."""
         patches = self.ending_and_midpoint
@@ -126,21 +122,16 @@ class Finger(ABC, Generic[PatchKind]):
         They are the SED, both forces, the depth, the bone's shift along +x, the contact width, the SED at the ending's
         midpoint, and every quantity at the ending.
         """
-        return self._numbers(states, self.recover(states, self.ending_and_midpoint))
+        return self.numbers_and_row(states, [])
 
-    def _numbers(self, states: Sequence[EquilibriumState], displacement: Array) -> Array:
+    def numbers_and_row(self, states: Sequence[EquilibriumState], rows: Sequence[Patches] | None = None) -> Array:
+        """Return `all_numbers`, then the SED of each ending of the row (c, COUNT + r); nan beyond the finger."""
+        rows = [self.row] if rows is None else rows
+        displacement = self.recover(states, self.ending_and_midpoint, *rows)
         responses = self.ending_and_midpoint.responses(displacement)  # (q, 2, c)
         columns = [(*s.force[::-1], s.load.depth, 0.0 - s.load.travel, self.contact_width(s)) for s in states]
-        return np.column_stack([responses[0, 0], columns, responses[0, 1], responses[:, 0].T])
-
-    def numbers_and_row(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return `all_numbers`, then the SED of each ending of the row (c, COUNT + r); nan beyond the finger."""
-        displacement = self.recover(states, self.ending_and_midpoint, self.row)
-        return np.hstack([self._numbers(states, displacement), self.row.average(displacement).T])
-
-    def responses(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return every quantity at the reference ending of several states (c, q)."""
-        return self.ending.responses(self.recover(states, self.ending))[:, 0].T
+        numbers = np.column_stack([responses[0, 0], columns, responses[0, 1], responses[:, 0].T])
+        return np.hstack([numbers, *(row.average(displacement).T for row in rows)])
 
     def recover(self, states: Sequence[EquilibriumState], *patches: Patches) -> Array:
         """Return the displacements (nodes, 2, c) of states, at least at the nodes of `patches`."""
@@ -187,10 +178,10 @@ class LinearFinger(Finger[LinearPatches]):
         large = sizes**2 > NO_ENERGY * sizes[0] ** 2
         return sizes[large, None] * turns[large]
 
-    def reaches_out(self, state: EquilibriumState, displacement: Array, indentation: float) -> bool:
+    def reaches_out(self, state: EquilibriumState, displacement: Array) -> bool:
         """Return whether skin touches outside the part that may, so that this part must be larger."""
         skin = self.geometry.all_skin
-        below = self.geometry.mesh.nodes[skin, 1] + displacement[skin, 1] < indentation * (1.0 - 1e-9)
+        below = self.geometry.mesh.nodes[skin, 1] + displacement[skin, 1] < state.load.depth * (1.0 - 1e-9)
         may = np.zeros(len(displacement), bool)
         may[self.geometry.mesh.skin] = True
         may = may[skin]
@@ -287,8 +278,6 @@ class GridPositions:
     body: FiniteBody
     arcs: Array  # (2 a + 1,) of nodes along the skin
     heights: Array  # (2 b + 1,) of nodes across the tissue
-    inner_arcs: Array  # (a, 3) of quadrature points
-    inner_heights: Array  # (b, 3)
     points: Array  # (e, 9, 2) quadrature points [mm]
     skin: Array  # (k,) arc positions of nodes that may touch
     lengths: Array  # (k,) their tributary lengths along the arc [mm]
@@ -300,8 +289,8 @@ class GridPositions:
         skin = finger.skin_arcs
         lengths = np.empty(len(skin))
         tributary(skin, body.middle, lengths)
-        points = VALUES @ finger.mesh.local(finger.mesh.nodes)
-        return GridPositions(body, arcs, heights, _inner(arcs[::2]), _inner(heights[::2]), points, skin, lengths)
+        points = Q2P1.shape(Q2P1.points)[0] @ finger.mesh.local(finger.mesh.nodes)
+        return GridPositions(body, arcs, heights, points, skin, lengths)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -318,28 +307,26 @@ class MeshTransfer:
     layer: Indices  # (b, 3) old rows that hold them
     forces: Array  # (k, old k) maps the old skin's forces, whose line density is linear between nodes
     nearest: Indices  # (k,) nearest old node of the skin
-    driven: Flags  # (nodes, 2) held components of the new nodes
 
     @staticmethod
     def of(old: GridPositions, new: GridPositions) -> "MeshTransfer":
         """Return the interpolation from the `old` to the `new` mesh."""
         along, across = _interpolation(old.arcs, new.arcs), _interpolation(old.heights, new.heights)
-        station = _piece(old.arcs[::2], new.inner_arcs)
-        layer = _piece(old.heights[::2], new.inner_heights)
+        station, layer = (
+            _piece(old_lines[::2], _inner(lines[::2]))
+            for old_lines, lines in ((old.arcs, new.arcs), (old.heights, new.heights))
+        )
         hats = [np.interp(new.skin, old.skin, unit, 0.0, 0.0) for unit in np.eye(len(old.skin))]
         forces = new.lengths[:, None] * np.stack(hats, axis=1) / old.lengths
         nearest = np.abs(new.skin[:, None] - old.skin).argmin(axis=1)
-        return MeshTransfer(old, new, *along, *across, station, layer, forces, nearest, new.body.mesh.driven)
+        return MeshTransfer(old, new, *along, *across, station, layer, forces, nearest)
 
     def transfer_state(self, state: EquilibriumState) -> EquilibriumState:
         """Return `state`, a state on the old mesh, as a start on the new mesh."""
-        return self.touch(state, *self.fields(state.u, state.pressure))
-
-    def touch(self, start: EquilibriumState, u: Array, pressure: Array) -> EquilibriumState:
-        """Return a start on the new mesh with `u` (nodes, 2), `pressure` (e, 3) and the contact of `start`."""
-        state, sense = start.state[self.nearest], start.sense[self.nearest]
-        state[state == STICK] = SLIP
-        return EquilibriumState(u, pressure, state, sense, self.forces @ start.reaction, start.load, start.iterations)
+        u, pressure = self.fields(state.u, state.pressure)
+        states, sense = state.state[self.nearest], state.sense[self.nearest]
+        states[states == STICK] = SLIP
+        return EquilibriumState(u, pressure, states, sense, self.forces @ state.reaction, state.load, state.iterations)
 
     def fields(self, u: Array, pressure: Array) -> tuple[Array, Array]:
         """Return displacements `u` [mm] (nodes, 2) and modes of `pressure` (e, 3) on the new mesh.
@@ -358,7 +345,7 @@ class MeshTransfer:
         away = self.new.points - old.centre[host]
         field = slopes[..., 0] + slopes[..., 1] * away[..., 0] + slopes[..., 2] * away[..., 1]
         pressure_new = np.einsum("eq,eq,eqm->em", new.elements.weight, field, new.elements.modes)
-        u_new[self.driven] = 0.0
+        u_new[new.mesh.driven] = 0.0
         return u_new, pressure_new
 
 

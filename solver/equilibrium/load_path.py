@@ -202,12 +202,12 @@ def end_of_path(scene: Scene, finger: Finger[Patches], step_factor: float = 1.0)
 
 
 def slide_or_hold(
-    scene: Scene, slide: Callable[[], EquilibriumState], hold: Callable[[], EquilibriumState]
+    scene: Scene, finger: Finger[Patches], slide: Callable[[], EquilibriumState], step_factor: float
 ) -> EquilibriumState:
-    """Return the state under the normal force of a scene: `slide`, or `hold` for a drag below the friction limit.
+    """Return the state under the normal force of a scene: `slide`, or a load path for a drag below the friction limit.
 
     A drag may have a state where full slip does not exist. Raises NoSteadyState for a drag beyond the friction limit,
-    and as `slide` and `hold` do.
+    and as `slide` and `march_scene` do.
     """
     force, drag = scene.normal_force, scene.tangential_force
     try:
@@ -215,13 +215,13 @@ def slide_or_hold(
     except SolveFailure:
         if drag is None:
             raise
-        return hold()
+        return march_scene(scene, finger, step_factor).last
     most = abs(float(state.force[0]))
     if drag is None or abs(drag - most) <= FULL_SLIP_TOLERANCE * most:
         return state
     if drag > most:
         raise beyond_friction(drag, most, force or 0.0)
-    return hold()
+    return march_scene(scene, finger, step_factor).last
 
 
 def steps_of(finger: Finger[Patches], *, relaxing: bool = False) -> LoadSteps:
@@ -272,35 +272,38 @@ def apply_loading(
             report(doing, share * (steps.press_steps + number) / count)
         return
     for direction in loading.directions:
-        _slide(path, direction * loading.speed, steps, _SettlingCriterion(path, finger, direction, step_factor), report)
+        _slide(
+            path, direction * loading.speed, steps, _settling_criterion(path, finger, direction, step_factor), report
+        )
 
 
 def _reason(path: LoadPath) -> str:
     return ", since the tissues relax" if path.tissue is not None else ""
 
 
-class _SettlingCriterion:
-    """Criterion that a slide is settled, evaluated before every step."""
+def _settling_criterion(
+    path: LoadPath, finger: Finger[Patches], direction: int, step_factor: float
+) -> Callable[[], bool]:
+    """Return a criterion that a slide is settled, to be evaluated before every step.
 
-    def __init__(self, path: LoadPath, finger: Finger[Patches], direction: int, step_factor: float) -> None:
-        self._path, self._finger, self._direction, self._step_factor = path, finger, direction, step_factor
-        self._sed: float | None = None
+    At small strain every point in contact must slip against the slide. At finite strain the ending's SED must be
+    constant too, unless tissues relax, for which a wait follows.
+    """
+    previous: float | None = None
 
-    def __call__(self) -> bool:
-        """Return whether the slide is settled.
+    def slips() -> bool:
+        state = path.last
+        against = (state.sense == -direction) | path.frictionless
+        return bool(((state.state == OPEN) | ((state.state != STICK) & against)).all())
 
-        At small strain every point in contact must slip against the slide. At finite strain the ending's SED must be
-        constant too, unless tissues relax, for which a wait follows.
-        """
-        state = self._path.last
-        if isinstance(self._finger, LinearFinger):
-            slips = (state.sense == -self._direction) | self._path.frictionless
-            return bool(((state.state == OPEN) | ((state.state != STICK) & slips)).all())
-        previous = self._sed
-        relaxes = self._path.tissue is not None
-        sed = self._sed = 0.0 if relaxes else self._finger.sed_ending(state.u)
-        still = previous is not None and (relaxes or abs(sed - previous) * self._step_factor <= SED_TOLERANCE * sed)
-        return still and not (state.state == STICK).any()
+    def is_still() -> bool:
+        nonlocal previous
+        before, relaxes = previous, path.tissue is not None
+        sed = previous = 0.0 if relaxes else finger.sed_ending(path.last.u)
+        still = before is not None and (relaxes or abs(sed - before) * step_factor <= SED_TOLERANCE * sed)
+        return still and not (path.last.state == STICK).any()
+
+    return slips if isinstance(finger, LinearFinger) else is_still
 
 
 def _slide(path: LoadPath, speed: float, steps: LoadSteps, settled: Callable[[], bool], report: Report) -> None:

@@ -202,9 +202,7 @@ class SlipControl:
     Halving or doubling the values for finite strain changed neither states nor tangents of sixteen slides.
     """
 
-    hertz_overlap: float = (
-        0.5  # relative to the depth, from which skin is guessed to touch: in Hertzian contact half does
-    )
+    hertz_overlap: float = 0.5  # relative to the depth, from which skin is guessed to touch: half does for Hertz
     max_hertz_systems: int = 12  # for that guess
     overlaps: tuple[float, ...] = (0.3, 0.6, 0.1, 0.9, 0.03, 0.01)  # relative to the depth, tried in turn
     intermediate_tolerance: float = 1e-4  # tolerance of steps before the last [-]; looser ones diverge near nu = 0.5

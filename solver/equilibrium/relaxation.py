@@ -61,9 +61,8 @@ class RelaxingBody:
         self.elastic = Elastic.of(mesh, shear)  # of the instantaneous shear moduli alone
         self._bulk = np.array([law.bulk for law in laws])[mesh.region]
         self.displacement = np.zeros(mesh.nodes.shape)
-        self._internal = np.zeros(
-            (len(mesh.elements), 18, self._g.shape[1])
-        )  # h of each term, as displacements of the elements' nodes
+        # h of each term, as displacements of the elements' nodes
+        self._internal = np.zeros((len(mesh.elements), 18, self._g.shape[1]))
         self._next: tuple[Callable[[Array], Array], float] | None = None
 
         @lru_cache(maxsize=STEP_LENGTHS)
@@ -119,10 +118,6 @@ class RelaxingBody:
             out += shear * self._g[element, term] * deviator
         return out
 
-    def average(self, endings: Endings) -> Array:
-        """Return the stored energy averaged over each ending (r,) [MPa]; nan for one outside the skin."""
-        return endings.means(self.energy(endings.probes))
-
     def _strain(self, probes: Probes, rows: Array, local: Array) -> tuple[Array, Array]:
         """Return e:e of the strain deviator and the volume strain (p,) for element displacements `local` (p, 18).
 
@@ -163,19 +158,11 @@ class CondensedRelaxing(CondensedFinite):
         """Take the prepared step to displacements `u` (nodes, 2)."""
         self.past = self.past.after(self.body.deformation(u).reshape(-1, 2, 2), step)
 
-    def assemble(self, u: Array, pressure: Array) -> float:
-        """Fill tangents and forces at a state and return the smallest det F."""
-        self._add(u)
-        return super().assemble(u, pressure)
-
-    def assemble_forces(self, u: Array) -> float:
-        """Fill the forces at a state, keep the tangent, and return the smallest det F."""
-        self._add(u)
-        return super().assemble_forces(u)
-
-    def _add(self, u: Array) -> None:
+    def assemble(self, u: Array, pressure: Array | None) -> float:
+        """Fill tangents and forces with the overstress, as `CondensedFinite` does; return the smallest det F."""
         more = self.system.overstress_force, self.system.overstress_tangent
         element_loops.overstress(u, self.tensor, self.body.elements, *more, np.empty((4, 9)))
+        return super().assemble(u, pressure)
 
     def excess(self, u: Array) -> Array:
         """Return the nodal forces (e, 18) of the overstress at displacements `u` (nodes, 2)."""
@@ -211,7 +198,6 @@ class LinearTissue:
     """Relaxing tissues at small strain."""
 
     def __init__(self, body: RelaxingBody, endings: Endings) -> None:
-        """Start in the state of `body`."""
         self._body, self._endings = body, endings
 
     def ready(self, step: float) -> Newton:
@@ -221,14 +207,13 @@ class LinearTissue:
     def commit(self, state: EquilibriumState, step: float) -> Array:  # noqa: ARG002 - `ready` has stored it
         """Take the prepared step to `state`; return the energy stored at each ending (r,) [MPa]."""
         self._body.advance(state.u)
-        return self._body.average(self._endings)
+        return self._endings.means(self._body.energy(self._endings.probes))
 
 
 class FiniteTissue:
     """Relaxing tissues at finite strain, and the past at the endings."""
 
     def __init__(self, body: FiniteBody, laws: Sequence[Prony], patches: FinitePatches) -> None:
-        """Start at rest; terms and instantaneous moduli come from `laws` by region."""
         self._relaxing, self._patches = CondensedRelaxing(body, laws), patches
         self._newton = Newton(self._relaxing)
         self._past = _at_rest(laws, body.mesh.region[patches.endings.probes.element])

@@ -275,9 +275,7 @@ class Lines:
     """Positions of the lines between a finger's elements, in the order of nodes: proximal to distal, and outwards."""
 
     arcs: tuple[float, ...]  # arc positions of the lines across the tissue [mm]
-    bone: tuple[
-        float, ...
-    ]  # radii of the lines along a meshed bone, from the core to 1, relative to the bone's radius; else empty
+    bone: tuple[float, ...]  # radii of the lines along a meshed bone, from the core to 1, the bone's radius; or empty
     fat: tuple[float, ...]  # heights in the fat, from 0 on the bone to 1
     skin: tuple[float, ...]  # depths in the skin, the outermost last [mm]
 

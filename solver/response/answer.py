@@ -8,7 +8,7 @@ import numpy as np
 
 from solver._kernels.contact_system import bounded_length
 from solver.accuracy import audits
-from solver.accuracy.error_estimate import Steps, errors, responses, row_errors
+from solver.accuracy.error_estimate import SHIFT, Steps, errors, row_errors
 from solver.accuracy.omitted_effects import Answer, model, warnings
 from solver.arrays import Array
 from solver.body import Patches
@@ -19,7 +19,8 @@ from solver.equilibrium.finger import Finger, LinearFinger
 from solver.equilibrium.load_path import Instant, LoadPath
 from solver.failures import NotConverged
 from solver.mesh import Fineness
-from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Prediction, Row, Skin, drag, sed_alone
+from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Prediction, Row, Skin, drag
+from solver.quantities import NAMES, SED
 from solver.scene import Scene
 
 # Elements per tip radius of the first mesh. At finite strain, skin folds on a mesh of 3 under steep friction; 5 takes a
@@ -61,10 +62,12 @@ def prediction(
     driven = scene.driven(depth)
     entry = model(driven, finger, state, solution.displacement, width)
     has_shift = scene.loading.dragged and state.load.path_dependent  # the shift of a sliding finger is arbitrary
-    numbers[4] = shift if has_shift else 0.0
+    numbers[SHIFT] = shift if has_shift else 0.0
     unknown = nested if isinstance(nested, NotConverged) else None
     nested_numbers = None if isinstance(nested, NotConverged) else nested
     estimates = errors(scene, numbers, nested_numbers, solution.steps)
+    if not has_shift:
+        estimates = estimates._replace(shift_error=None)
     return Prediction(
         scene=scene,
         sed_ending=sed,
@@ -74,23 +77,14 @@ def prediction(
         contact_width=width,
         indentation=depth,
         shift=shift if has_shift else None,
-        error_estimate=estimates.sed,
-        corrected_error=estimates.corrected,
-        normal_force_error=estimates.normal,
-        tangential_force_error=estimates.tangential,
-        indentation_error=estimates.indentation,
-        shift_error=estimates.shift if has_shift else None,
-        contact_width_error=estimates.width,
         nested=nested_numbers,
         unknown=unknown,
-        sed_point_error=estimates.point,
         dofs=finger.body.mesh.dofs,
         newton_iterations=state.iterations,
         wall_s=solution.wall_s,
         setup_s=solution.setup_s,
         estimate_s=estimate_s,
         row=Row(ROW, row, row_errors(row, nested_numbers)),
-        responses=responses(numbers, estimates),
         model=entry,
         audits=solution.audits,
         skin=skin_of(finger, state),
@@ -102,6 +96,7 @@ def prediction(
             *solution.warnings,
             *audits.round_off_warnings(solution.audits),
         ),
+        **estimates._asdict(),
     )
 
 
@@ -121,11 +116,16 @@ def skin_of(finger: Finger[Patches], state: EquilibriumState) -> Skin:
 
 def history(scene: Scene, finger: Finger[Patches], path: LoadPath) -> History:
     """Return a load path as arrays; at small strain it begins with the finger at rest."""
-    relaxing = path.tissue is not None
     first = 0 if isinstance(finger, LinearFinger) else 1
     instants = path.instants[first:]
     states = [instant.state for instant in instants]
-    sed = np.array([(0.0, 0.0), *path.energies])[first:] if relaxing else finger.seds(states)
+    if path.tissue is not None:
+        sed = np.array([(0.0, 0.0), *path.energies])[first:]
+        responses = np.full((len(sed), len(NAMES)), np.nan)  # of all quantities but the SED
+        responses[:, NAMES.index(SED.name)] = sed[:, 0]
+    else:
+        values = finger.ending_and_middle(states)
+        sed, responses = values[:, 0], values[:, :, 0]
     return History(
         time=np.array([i.time for i in instants]),
         bone_x=np.array([i.travel for i in instants]),
@@ -136,7 +136,7 @@ def history(scene: Scene, finger: Finger[Patches], path: LoadPath) -> History:
         tangential_force=np.array([drag(scene, float(s.tangential.sum())) for s in states]),
         contact_width=np.array([finger.contact_width(s) for s in states]),
         slipping=np.array([1.0 - s.sticking if s.touching.any() else 0.0 for s in states]),
-        responses=sed_alone(sed[:, 0]) if relaxing else finger.responses(states),
+        responses=responses,
     )
 
 

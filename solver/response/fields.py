@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.arrays import Array, Indices
-from solver.body import Endings, Probes
-from solver.body.finite import FiniteBody, FinitePatches
+from solver.body import Probes
+from solver.body.finite import FiniteBody
 from solver.body.linear import Elastic
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import LinearFinger, finite_laws, settled_moduli
@@ -35,9 +35,7 @@ class Fields:
 
     nodes: Array  # (n, 2) deformed positions [mm]; a node between layers appears once for each
     triangles: Indices  # (t, 3)
-    values: Mapping[
-        str, Array
-    ]  # (n,) each of `FIELDS`, averaged over the elements of one layer at the node; `DISPLACEMENT`
+    values: Mapping[str, Array]  # (n,) `FIELDS`, averaged over the elements of one layer at the node; `DISPLACEMENT`
     outlines: Mapping[str, Array]  # "skin", "epidermis", "dermis", "bone": (m, 2) deformed lines [mm]
     patch: Array  # (m, 2) outline of the reference ending, deformed [mm]
 
@@ -127,12 +125,10 @@ def _values(prediction: Prediction, sketch: Sketch) -> Array:
     if scene.solve.kinematics == "small":
         return sketch.values(prediction.displacement[:, :, None])[:, :, 0]
     body = FiniteBody.of(prediction.mesh, finite_laws(scene.materials), checked=True)
-    count = len(sketch.probes.element)
 
     def values(probes: Probes) -> Array:
-        places = Endings(probes, np.ones(count), np.arange(count), count, np.tile([1.0, 0.0], (count, 1)))
         with np.errstate(invalid="ignore", divide="ignore"):  # a node turned inside out has no energy
-            state = FinitePatches(body, places).state(prediction.displacement)
+            state = body.state(body.probe_data(probes), prediction.displacement)
             return np.stack([field.finite(state) for field in FIELDS])
 
     fields = values(sketch.probes)

@@ -65,13 +65,8 @@ def _mean(time: Array, values: Array, begin: int, end: int) -> Array:
 
 
 INSTANTS = ("press", "break_away", "slide")  # parts at whose ends the results are taken
-COURSE_NUMBERS = (
-    "sed_ending",
-    "sed_point",
-    "normal_force",
-    "tangential_force",
-    "contact_width",
-)  # followed by the quantities
+# followed by the quantities
+COURSE_NUMBERS = ("sed_ending", "sed_point", "normal_force", "tangential_force", "contact_width")
 _PLACES = [0, 6, 1, 2, 5]  # indices of these in `Finger.all_numbers`, in which quantities begin at index 7
 
 

@@ -143,7 +143,7 @@ def _sound_state(finger: Finger[Any], scene: Scene, near: EquilibriumState | Non
     else:
         assert isinstance(finger, LinearFinger)
         state = state_on_branch(scene, finger)
-        usable = not finger.reaches_out(state, finger.displacement(state), state.load.depth)
+        usable = not finger.reaches_out(state, finger.displacement(state))
     if usable:
         return state
     raise NotConverged("no sound state was found")

@@ -140,7 +140,7 @@ class SmallMeshing(Meshing):
                 state = replace(state, u=finger.body.condensed.displacement_under(state.reaction))
         displacement = finger.displacement(state)
         refuse_beyond_tissue(scene, finger, state.load.depth)
-        if finger.reaches_out(state, displacement, state.load.depth):
+        if finger.reaches_out(state, displacement):
             return None
         direct_solve = path is None and scene.normal_force is None and not state.load.path_dependent
         (state, displacement), checks = _remove_round_off(scene, finger, (state, displacement), always=direct_solve)

@@ -9,8 +9,7 @@ from solver._kernels.contact_system import SHEAR_LIMITED_MU
 from solver.accuracy.adaptivity import refine_lines
 from solver.accuracy.convergence_order import trial_warnings
 from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error
-from solver.accuracy.omitted_effects import COARSE, Answer, measure_differences
-from solver.accuracy.residual_overstress import with_viscosity
+from solver.accuracy.omitted_effects import COARSE, Answer, measure_differences, with_viscosity
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 from solver.failures import Folds, NotConverged, SolveFailure

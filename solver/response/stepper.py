@@ -145,15 +145,11 @@ class StepperControl:
     """Iterations for a reading at finite strain, and criteria for a valid state and for a lost one."""
 
     max_force_error: float = 0.02  # of a valid state, relative to the normal force
-    retry_ratio: float = (
-        0.7  # ratio of the normal force to that of the last failure, below which a lost state is tried again
-    )
+    retry_ratio: float = 0.7  # normal force relative to that of the last failure, below which a lost state is retried
     restart_steps: int = 12  # load steps from the undeformed finger to the forces of a reading
     restart_iterations: int = 3  # iterations for each restart step
     max_catch_up_iterations: int = 8  # for the last restart step, and after an invalid state
-    catch_up_step: float = (
-        1e-3  # displacement in an iteration that ends the catch-up, relative to the length scale of the body
-    )
+    catch_up_step: float = 1e-3  # displacement in an iteration that ends the catch-up, relative to the length scale
     min_stretch: float = 0.65  # of valid skin: it folds at 0.544, later on a coarse mesh
     max_kink: float = 0.3  # of valid skin: a coarse mesh has this where skin folds
     large_step: float = 0.01  # displacement in an iteration after which another follows, relative to the length scale
@@ -171,7 +167,6 @@ class FiniteStepper(Stepper):
     finger: FiniteFinger
 
     def __init__(self, finger: FiniteFinger, mu: float, tau: float = np.inf) -> None:
-        """Start undeformed, as `Stepper`."""
         super().__init__(finger, mu, tau)
         self._lost_at: float | None = None  # normal force [N/mm]
         self._restart_failed = False  # whether the load steps from the undeformed finger failed
@@ -275,10 +270,7 @@ class FiniteStepper(Stepper):
 
 
 _FINENESS = {"small": 4.0, "finite": 2.7}  # meshes on which the response is accurate to about 1 % of its peak
-MARGIN = {
-    "small": 4.0,
-    "finite": 6.0,
-}  # `Sizing.margin`: undeformed skin lower than 2 or 2.5 times the indentation may touch
+MARGIN = {"small": 4.0, "finite": 6.0}  # `Sizing.margin`: skin lower than 2 or 2.5 times the indentation may touch
 # A nine-node element as four quadrilaterals, and the local coordinates of their midpoints.
 QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
 MIDPOINTS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])

@@ -82,7 +82,7 @@ def _small(scenes: Sequence[Scene], fineness: float, shift: bool, step_factor: i
     for scene in scenes:
         stepwise = scene.viscoelastic and depends_on_way(scene)
         state = (end_of_path if stepwise else settled_state)(scene, finger, step_factor)
-        if finger.reaches_out(state, finger.displacement(state), state.load.depth):
+        if finger.reaches_out(state, finger.displacement(state)):
             raise NotConverged("Contact reaches out of the skin that is looked at.")
         yield np.abs(finger.numbers([state])[0])
 

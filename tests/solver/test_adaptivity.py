@@ -24,7 +24,7 @@ COARSE = Sizing(4.0, 1.5, margin=WIDE_MARGIN)
 
 
 def sed(finger, scene):
-    return finger.seds([settled_state(scene, finger)])[0, 0]
+    return finger.ending_and_middle([settled_state(scene, finger)])[0, 0, 0]
 
 
 @pytest.mark.parametrize("scene", SLIDES.values(), ids=SLIDES)

@@ -87,13 +87,15 @@ def test_an_error_that_falls_with_the_square_of_an_element_is_known_and_edges_ad
     zeros, edges = np.zeros((1, COUNT)), np.full((2, COUNT), 0.005)
     nested = NestedNumbers(truth * (1.0 + error / 4.0), zeros, zeros, zeros, 2.0)
     estimate = errors(sliding, truth * (1.0 + error), nested, None)
-    assert estimate.sed == pytest.approx(error / (1.0 + error), rel=1e-12)
-    assert estimate.corrected == pytest.approx(error / 4.0 / (1.0 + error / 4.0), rel=1e-12)
+    assert estimate.error_estimate == pytest.approx(error / (1.0 + error), rel=1e-12)
+    assert estimate.corrected_error == pytest.approx(error / 4.0 / (1.0 + error / 4.0), rel=1e-12)
     with_edges = errors(sliding, truth * (1.0 + error), replace(nested, edge_changes=edges), None)
-    assert with_edges.sed - estimate.sed == pytest.approx(0.01 / 3.0 / 1.04, rel=1e-12)
-    assert with_edges.corrected - estimate.corrected == pytest.approx(0.01 / 3.0 / 1.01, rel=1e-12)
-    assert with_edges.width - estimate.width == pytest.approx(0.01 / 1.04, rel=1e-12)  # it follows an edge by a line
-    assert with_edges.responses - estimate.responses == pytest.approx(0.01 / 3.0, rel=1e-12)
+    assert with_edges.error_estimate - estimate.error_estimate == pytest.approx(0.01 / 3.0 / 1.04, rel=1e-12)
+    assert with_edges.corrected_error - estimate.corrected_error == pytest.approx(0.01 / 3.0 / 1.01, rel=1e-12)
+    widths = with_edges.contact_width_error, estimate.contact_width_error
+    assert widths[0] - widths[1] == pytest.approx(0.01 / 1.04, rel=1e-12)  # it follows an edge by a line
+    for name, response in estimate.responses.items():
+        assert with_edges.responses[name].error - response.error == pytest.approx(0.01 / 3.0, rel=1e-12)
 
 
 @pytest.mark.parametrize("order", [1.0, 2.0])
@@ -157,8 +159,9 @@ def test_estimates_of_the_row_lie_above_its_errors_beneath_the_edges_of_contact_
 
 
 def test_where_the_nested_mesh_has_no_state_nothing_is_known():
-    estimate = errors(Scene(friction=Friction(0.3), loading=Loading(1.0)), np.ones(7), None, None)
-    assert (estimate.sed, estimate.normal, estimate.tangential) == (1.0, 1.0, 1.0)
+    estimate = errors(Scene(friction=Friction(0.3), loading=Loading(1.0)), np.ones(COUNT), None, None)
+    assert estimate[:5] == (1.0, 1.0, 1.0, 1.0, 1.0)
+    assert estimate.shift_error is None
 
 
 @pytest.mark.parametrize("kinematics", ["small", pytest.param("finite", marks=pytest.mark.slow)])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, Material, Materials, Relaxation, Scene, SceneError, Solve, solve
-from solver.accuracy.residual_overstress import relaxing_scene
+from solver.accuracy.omitted_effects import relaxing_scene
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
 

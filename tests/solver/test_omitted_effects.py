@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from solver import Friction, Loading, Material, Materials, Relaxation, Scene, Solve, solve
-from solver.accuracy.residual_overstress import relaxing_scene
+from solver.accuracy.omitted_effects import relaxing_scene
 from solver.equilibrium.finger import settled_moduli
 
 SLIDE = Scene(friction=Friction(0.3), loading=Loading(1.0, "+x"), solve=Solve(evidence="quick"))
