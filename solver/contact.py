@@ -31,7 +31,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.arrays import Array
 from solver.body.validation import finite
 

@@ -11,8 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from solver._kernels import multifrontal
-from solver._kernels.compiling import bind_arguments
+from solver._kernels import bind_arguments, multifrontal
 from solver.arrays import Array, Factors, Flags, Indices, Narrow, SymbolicFactorization
 from solver.mesh import Mesh, distinct
 

@@ -140,12 +140,9 @@ class Prediction:
         plain["sed_ending_corrected"] = None if self.nested is None else self.sed_ending_corrected
         plain["row"] = {name: _plain(getattr(self.row, name)) for name in ("arc", "sed", "error")}
         plain["responses"] = {
-            quantity.name: {
-                "unit": quantity.unit,
-                "meaning": quantity.meaning,
-                **_response(self.responses[quantity.name]),
-            }
+            quantity.name: {"unit": quantity.unit, "meaning": quantity.meaning, "value": value, "error": error}
             for quantity in QUANTITIES
+            for value, error in [_plain(np.array(self.responses[quantity.name]))]
         }
         plain["model"] = dict(self.model)
         plain["audits"] = dict(self.audits)
@@ -166,11 +163,6 @@ def percent(part: float) -> str:
     ('0.43 %', '100 %', '142 %')
     """
     return f"{100.0 * part:.2g} %" if abs(part) < 0.995 else f"{100.0 * part:.0f} %"
-
-
-def _response(response: Response) -> dict[str, float | None]:
-    value, error = _plain(np.array(response))
-    return {"value": value, "error": error}
 
 
 def _plain(numbers: Array) -> list[float | None]:

@@ -1,18 +1,178 @@
-"""The compiled loops of the solver (numba, cached on disk). No other module is compiled.
+"""The compiled loops of the solver (numba, cached on disk), and the types and constants they share.
 
-Tests compare the loops with plain NumPy versions.
+No other module is compiled. Tests compare the loops with plain NumPy versions.
 """
 
 import gc
+import os
 import signal
 import threading
-from contextlib import ExitStack
+from collections.abc import Callable, Generator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
+from hashlib import blake2b
+from importlib import import_module
+from pathlib import Path
+from tempfile import mkdtemp
 from types import FrameType
-from typing import Any
+from typing import Any, TypeVar, cast
 
-from solver._kernels.compiling import events
+import numpy as np
+from numpy.typing import NDArray
+
 from solver.progress import interlude
+
+States = NDArray[np.int8]
+Loop = TypeVar("Loop", bound=Callable[..., Any])
+Result = TypeVar("Result")
+
+HELD_X, HELD_Y = 1, 2  # flags of a skin node with a prescribed displacement; their sum for both directions
+OPEN, STICK, SLIP, SHEAR_LIMITED = 0, 1, 2, 3  # contact states of a skin node
+# all of fastmath except nnan and ninf: nan and infinity keep their meaning
+_OPTIONS: dict[str, Any] = {
+    "fastmath": {"contract", "reassoc", "arcp", "nsz"}, "error_model": "numpy", "no_cfunc_wrapper": True,
+}  # fmt: skip
+_FOLDER = Path(__file__).parent
+_ARRAYS = _FOLDER.parent / "arrays.py"  # types of the loops' arguments
+
+
+def _cache_folder() -> Path:
+    """Return the folder where numba keeps compiled loops: one for each version of their sources.
+
+    To see whether code is outdated, numba checks only the file of a loop, not the functions that the loop calls. The
+    process runs the code in the folder, so only the user may have write access. The first such folder is used: the one
+    in the environment variable NUMBA_CACHE_DIR, one next to the sources, or one among the user's caches. Without any,
+    this process gets an empty folder and compiles everything again.
+    """
+    from platformdirs import user_cache_path
+
+    sources = blake2b(digest_size=8)
+    for file in (*sorted(_FOLDER.glob("*.py")), _ARRAYS):
+        sources.update(file.read_bytes())
+    version = f"solver-{sources.hexdigest()}"
+    setting = os.environ.get("NUMBA_CACHE_DIR")
+    user_cache = user_cache_path("daq-app", appauthor=False)
+    places = [_FOLDER / "__pycache__", user_cache] if is_private(_FOLDER) else [user_cache]
+    if setting:
+        places.insert(0, Path(setting).parent if Path(setting).name == version else Path(setting))
+    for place in places:
+        with suppress(OSError):
+            place.mkdir(mode=0o700, parents=True, exist_ok=True)  # `mode` does not apply to new parents
+            if place == user_cache:
+                place.chmod(0o700)  # another program, or an earlier run, may have made it open to a group
+            (place / version).mkdir(mode=0o700, exist_ok=True)
+            if all(is_private(folder) for folder in (place, place / version)):
+                return place / version
+    return Path(mkdtemp(prefix="daq-app-"))
+
+
+def is_private(folder: Path) -> bool:
+    """Return whether only this user may write in `folder`; on systems without file owners, whether this user may."""
+    if not os.access(folder, os.W_OK) or not hasattr(os, "getuid"):
+        return os.access(folder, os.W_OK)
+    status = folder.stat()
+    return status.st_uid == os.getuid() and not status.st_mode & 0o022
+
+
+os.environ["NUMBA_CACHE_DIR"] = str(_cache_folder())  # numba reads it once, at import
+_numba: Any = import_module("numba")
+_caching: Any = import_module("numba.core.caching")
+events: Any = import_module("numba.core.event")
+
+
+class _SharedCache(_caching.FunctionCache):
+    """Numba's cache on disk with a lock, so that concurrent processes write one after the other.
+
+    Numba reads the index of a loop, adds an entry, and writes it back. Two concurrent processes could lose an entry, or
+    make it point to the other's code.
+    """
+
+    def save_overload(self, sig: object, data: object) -> None:
+        """Save compiled code and its index entry."""
+        with _alone(Path(os.environ["NUMBA_CACHE_DIR"])):
+            _caching.FunctionCache.save_overload(self, sig, data)
+
+
+@contextmanager
+def _alone(folder: Path) -> Generator[None]:
+    """Hold an exclusive lock on `folder` until the block ends, on systems with file locks."""
+    with ExitStack() as resources:
+        try:
+            from fcntl import LOCK_EX, flock
+
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            flock(resources.enter_context((folder / "lock").open("w")), LOCK_EX)
+        except (ImportError, OSError):  # no file locks here: a loop may be compiled twice
+            pass
+        yield
+
+
+def compile_loop(function: Loop) -> Loop:
+    """Return `function` as a loop that numba compiles at the first call from Python and caches on disk.
+
+    A loop that calls another loop inlines its source. Without inlining, the version that a process loads first would
+    serve all callers. The last bits of a result would then depend on earlier calls, and on whether the process compiled
+    or loaded the code. A division by zero gives infinity: an exception would need a branch each time, and a sixth more
+    time to compile.
+    """
+    loop = _numba.njit(**_OPTIONS, inline="always")(function)
+    loop._cache = _SharedCache(function)  # noqa: SLF001 - as `cache=True`, with a lock
+    return cast("Loop", loop)
+
+
+def subroutine(function: Loop) -> Loop:
+    """Return `function` as a subroutine that LLVM inlines into loops; Python cannot call it.
+
+    It compiles faster than inlined source, once for all loops that call it.
+    """
+    return cast("Loop", _numba.njit(**_OPTIONS, no_cpython_wrapper=True, forceinline=True)(function))
+
+
+def bind_arguments(loop: Callable[..., Result], *last: object) -> Callable[..., Result]:
+    """Return `loop` with its `last` arguments bound, so that a call inspects the types of the first ones only.
+
+    For thirty arrays, numba's inspection takes five times as long as passing them: a tenth of the work on a small mesh.
+    """
+    last_kinds = tuple([_kind(argument) for argument in last])
+    entries: dict[tuple[object, ...], Callable[..., Result]] = {}
+
+    def call(*first: object) -> Result:
+        key = tuple([_kind(argument) for argument in first])
+        entry = entries.get(key)
+        if entry is None:
+            entry = entries[key] = _entry(loop, (key, last_kinds), (*first, *last))
+        return entry(*first, *last)
+
+    return call
+
+
+def _entry(loop: Callable[..., Result], kinds: tuple[object, ...], arguments: tuple[object, ...]) -> Callable[..., Any]:
+    """Return the compiled code of a loop for arguments of these `kinds`; compile or load it at first use."""
+    entry = _ENTRIES.get((loop, *kinds))
+    if entry is None:
+        dispatcher: Any = loop
+        types = tuple(_numba.typeof(argument) for argument in arguments)
+        dispatcher.compile(types)  # or load
+        entry = _ENTRIES[loop, *kinds] = dispatcher.overloads[types].entry_point
+    return entry
+
+
+def _kind(argument: Any) -> object:  # noqa: ANN401 - an array, a number, or a tuple of both
+    """Return a key that distinguishes numba's types; it is faster to compute than the types."""
+    kind: object = argument.__class__
+    if kind is np.ndarray:
+        return _array_kind(argument)
+    if not isinstance(argument, tuple):
+        return kind
+    parts = cast("tuple[Any, ...]", argument)
+    return kind, *[_array_kind(part) if part.__class__ is np.ndarray else part.__class__ for part in parts]
+
+
+def _array_kind(array: Any) -> object:  # noqa: ANN401 - of any type
+    return array.dtype.num, array.ndim, array.flags.num
+
+
+_ENTRIES: dict[tuple[object, ...], Callable[..., Any]] = {}  # by loop and the kinds of its arguments
 
 
 class _Compilation(events.Listener):

@@ -6,7 +6,7 @@ that contradict the solution change together. Once a set of states has recurred,
 
 import numpy as np
 
-from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, compile_loop, subroutine
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK, compile_loop, subroutine
 from solver._kernels.contact_system import (
     RIGHT_SIDES,
     SHEAR_LIMITED_MU,

@@ -5,7 +5,7 @@ The first functions compute the tributary lengths of skin nodes.
 
 import numpy as np
 
-from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, compile_loop, subroutine
+from solver._kernels import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, compile_loop, subroutine
 from solver.arrays import (
     Array,
     CondensedArrays,

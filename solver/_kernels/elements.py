@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solver._kernels.compiling import compile_loop, subroutine
+from solver._kernels import compile_loop, subroutine
 from solver.arrays import (
     NEO_HOOKEAN,
     Array,

@@ -7,7 +7,7 @@ are stored: (k, k + b), upper half. The border's Schur complement (b, b) stays i
 
 import numpy as np
 
-from solver._kernels.compiling import compile_loop, subroutine
+from solver._kernels import compile_loop, subroutine
 from solver.arrays import Array, Factors, Flags, Narrow, SymbolicFactorization
 
 UNSOLVABLE, INDEFINITE, DEFINITE = 0, 1, 2  # results of `eliminate`

@@ -5,7 +5,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from solver._kernels.compiling import SHEAR_LIMITED
+from solver._kernels import SHEAR_LIMITED
 from solver._kernels.contact_system import bounded_length
 from solver.arrays import Array
 from solver.body import Patches

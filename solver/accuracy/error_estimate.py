@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from solver._kernels.active_set import SINGULAR
-from solver.accuracy.convergence_order import ORDER, richardson_factor
+from solver.accuracy import ORDER, richardson_factor
 from solver.arrays import Array
 from solver.body import Patches
 from solver.contact import ForceLoad
@@ -310,15 +310,10 @@ def contrast_error(predictions: Sequence[Prediction]) -> ContrastError:
     noticeable[0] = True
     excess = np.where((shares > WARNING_SHARE) & noticeable, shares, 0.0)
     first = int(excess.argmax())
-    return ContrastError(
-        float(shares[0]), _in_a_sentence(COMPARED[first], float(excess[first])) if excess.any() else ""
-    )
-
-
-def _in_a_sentence(name: str, share: float) -> str:
-    part = percent(share) if share < 1.0 else "more than all"
-    small = f"Differences in {name} from the surfaces solved with this one are small"
-    return f"{small}, and may be off by {part} of their range."
+    part = percent(float(excess[first])) if excess[first] < 1.0 else "more than all"
+    small = f"Differences in {COMPARED[first]} from the surfaces solved with this one are small"
+    warning = f"{small}, and may be off by {part} of their range." if excess.any() else ""
+    return ContrastError(float(shares[0]), warning)
 
 
 Numbers = Callable[[Newton, EquilibriumState], Array]

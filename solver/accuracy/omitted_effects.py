@@ -38,7 +38,6 @@ STRAIN_LIMIT = 0.1  # strain from which there is a warning at small strain [-]
 
 
 def _describe_laws(scene: Scene) -> str:
-    """Return the law of every tissue as text."""
     usual = "Hooke" if scene.solve.kinematics == "small" else "compressible neo-Hookean"
     laws: list[str] = []
     for name in ("epidermis", "dermis", "fat"):

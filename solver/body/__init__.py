@@ -9,7 +9,7 @@ from typing import ClassVar, NamedTuple, Protocol, Self
 import numpy as np
 from numpy.linalg import LinAlgError
 
-from solver._kernels.compiling import HELD_X, HELD_Y
+from solver._kernels import HELD_X, HELD_Y
 from solver.arrays import NEO_HOOKEAN, Array, ElementArrays, Indices, Narrow, inverse
 from solver.constitutive import Elasticity
 from solver.mesh import Q2P1, Mesh, distinct, integrals

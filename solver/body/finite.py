@@ -8,8 +8,8 @@ from typing import Self, cast
 
 import numpy as np
 
+from solver._kernels import bind_arguments
 from solver._kernels import elements as element_loops
-from solver._kernels.compiling import bind_arguments
 from solver._kernels.multifrontal import DEFINITE, UNSOLVABLE
 from solver.arrays import Array, BodyState, ElementSystem, Indices, Narrow, SymbolicFactorization
 from solver.body import MeshElements, Patches, held_directions, integrate_elements

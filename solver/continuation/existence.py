@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver._kernels.compiling import OPEN, SHEAR_LIMITED
+from solver._kernels import OPEN, SHEAR_LIMITED
 from solver._kernels.contact_system import SHEAR_LIMITED_MU
 from solver.contact import LoadState
 from solver.continuation import Continuation

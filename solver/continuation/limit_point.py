@@ -73,20 +73,13 @@ class BranchSearch:
         """The largest value to which the branch is followed; beyond LARGEST_MU the traction bound governs."""
         return self.target if self.parameter == BY_DEPTH else min(self.target, LARGEST_MU)
 
-    def to(self, target: float) -> "BranchSearch":
-        """Return the search with another target."""
-        return replace(self, target=target)
-
     def trace(self, finger: FiniteFinger, start: EquilibriumState, length: float | None = None) -> Branch:
         """Return the branch from `start` until it passes the target; `length` is that of its first step."""
-        return self._on(finger).trace(start, self.last, length)
-
-    def _on(self, finger: FiniteFinger) -> Continuation:
-        return Continuation(finger, self.parameter, self.critical_stretch)
+        return Continuation(finger, self.parameter, self.critical_stretch).trace(start, self.last, length)
 
     def stop(self, finger: FiniteFinger, branch: Branch) -> Branch:
         """Return a branch up to the target, which one step from LARGEST_MU reaches."""
-        branch = self._on(finger).stop_at(branch, self.last)
+        branch = Continuation(finger, self.parameter, self.critical_stretch).stop_at(branch, self.last)
         if branch.ends_early or self.last == self.target:
             return branch
         load = branch.last.load._replace(mu=self.target)
@@ -190,7 +183,7 @@ def _coarse_branch(search: BranchSearch) -> Branch:
     finger = search.finger()
     if search.parameter == BY_DEPTH or search.target == PIECES[0]:
         return search.trace(finger, search.start(finger))
-    before = _coarse_branch(search.to(search.target / 2.0))
+    before = _coarse_branch(replace(search, target=search.target / 2.0))
     if before.ends_early:
         return before
     after = search.trace(finger, before.last, before.length)
@@ -201,9 +194,10 @@ def _coarse_branch(search: BranchSearch) -> Branch:
 def _continuation_limit(search: BranchSearch) -> ContinuationLimit:
     """Return the range of a branch, cached because all meshes of a scene need it."""
     by_depth = search.parameter == BY_DEPTH
-    coarse = _coarse_branch(search if by_depth else search.to(min(end for end in PIECES if end >= search.last)))
+    whole = search if by_depth else replace(search, target=min(end for end in PIECES if end >= search.last))
+    coarse = _coarse_branch(whole)
     if coarse.value < search.last < LARGEST_MU and not by_depth:
-        end = _continuation_limit(search.to(LARGEST_MU))
+        end = _continuation_limit(replace(search, target=LARGEST_MU))
         if end.ends_early and end.value < search.target:
             return end
     finger = search.finger()

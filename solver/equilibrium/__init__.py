@@ -13,9 +13,8 @@ import numpy as np
 from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
 
-from solver._kernels import active_set
+from solver._kernels import HELD_X, HELD_Y, OPEN, SLIP, STICK, active_set, bind_arguments
 from solver._kernels.active_set import DEPTH_CONTROL, DRAG_CONTROL, PUSH_CONTROL, SINGULAR, UNSETTLED
-from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SLIP, STICK, bind_arguments
 from solver.arrays import (
     Array,
     CondensedArrays,

@@ -15,7 +15,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.linalg import LinAlgError
 
-from solver._kernels.compiling import SLIP, STICK
+from solver._kernels import SLIP, STICK
 from solver._kernels.contact_system import tributary
 from solver.arrays import Array, Indices
 from solver.body import Body, Endings, Patches

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver._kernels.compiling import OPEN, STICK
+from solver._kernels import OPEN, STICK
 from solver.arrays import Array
 from solver.body import Patches
 from solver.contact import ForceLoad, LoadState

@@ -5,7 +5,7 @@ also returns the derivatives with respect to depth and travel. These give the ch
 In full slip every point in contact slips, so that the state does not depend on its load path.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import isfinite
@@ -14,7 +14,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
+from solver.arrays import Array
 from solver.contact import ForceLoad, LoadState
 from solver.equilibrium import TO_ROUND_OFF, EquilibriumState, Newton, Termination, lower_onto_surface
 from solver.failures import ContactLost, NotConverged, at_end_of_path
@@ -256,21 +257,14 @@ def _linear_slide(newton: Newton, load: LoadState, start: EquilibriumState | Non
         raise ValueError("sense = 0 is not allowed: friction on what slides points along +1 or -1")
     if start is not None:
         return slide_from_guess(newton, load, start.state)
-    height = newton.condensed.skin_positions(newton.condensed.undeformed()[0])[:, 1]
+    height = _skin_heights(newton)
     if newton.condensed.motions.shape[1]:  # a rigid motion changes its depth
-        return _slide_from_guesses(newton, load, float(np.ptp(height)), None)
+        return _first_slide(newton, load, _lowest_skin(height, float(np.ptp(height))))
     above = height - load.depth
-    guesses = [
-        (above < -SLIP_CONTROL.hertz_overlap * load.depth, SLIP, SLIP_CONTROL.max_hertz_systems),
-        (above < 0.0, SLIP, None),
-    ]
-    if isfinite(load.tau):
-        guesses.append((above < 0.0, SHEAR_LIMITED, None))
-    for low, slips, rounds in guesses[:-1]:
-        with suppress(ContactLost):
-            return slide_from_guess(newton, load, np.where(low, slips, OPEN), rounds=rounds)
-    low, slips, _ = guesses[-1]
-    return slide_from_guess(newton, load, np.where(low, slips, OPEN))
+    low = above < -SLIP_CONTROL.hertz_overlap * load.depth
+    guesses: list[Guess] = [(np.where(low, SLIP, OPEN), SLIP_CONTROL.max_hertz_systems)]
+    guesses += [(np.where(above < 0.0, slips, OPEN), None) for slips in (SLIP, SHEAR_LIMITED)]
+    return _first_slide(newton, load, guesses if isfinite(load.tau) else guesses[:-1])
 
 
 def slide_from_guess(
@@ -292,20 +286,34 @@ def slide_under(newton: Newton, load: LoadState, force: float, deepest: float | 
 
     `deepest` [mm] scales the first guesses of the depth, by default the height of the skin. Raises ContactLost.
     """
-    height = newton.condensed.skin_positions(newton.condensed.undeformed()[0])[:, 1]
-    state = _slide_from_guesses(newton, load, float(np.ptp(height)) if deepest is None else deepest, force)
+    height = _skin_heights(newton)
+    guesses = _lowest_skin(height, float(np.ptp(height)) if deepest is None else deepest)
+    state = _first_slide(newton, load, guesses, force)
     if deepest is None or state.load.depth > 0.0:
         return state
     raise ContactLost("the touching points have no forces that amount to the normal force")
 
 
-def _slide_from_guesses(newton: Newton, load: LoadState, scale: float, force: float | None) -> EquilibriumState:
-    """Return full slip from the first successful guess of contact: parts of `scale` [mm] above the lowest node."""
-    height = newton.condensed.skin_positions(newton.condensed.undeformed()[0])[:, 1]
-    guesses = [np.where(height <= float(height.min()) + part * scale, SLIP, OPEN) for part in SLIP_CONTROL.overlaps]
-    for guess in guesses[:-1]:
+Guess = tuple[NDArray[np.integer], int | None]  # contact states (k,), and the most systems to solve from there
+
+
+def _skin_heights(newton: Newton) -> Array:
+    return newton.condensed.skin_positions(newton.condensed.undeformed()[0])[:, 1]
+
+
+def _lowest_skin(height: Array, scale: float) -> list[Guess]:
+    """Return guesses of contact: skin up to parts of `scale` [mm] above the lowest node, at `height` (k,) [mm]."""
+    limits = (float(height.min()) + part * scale for part in SLIP_CONTROL.overlaps)
+    return [(np.where(height <= limit, SLIP, OPEN), None) for limit in limits]
+
+
+def _first_slide(
+    newton: Newton, load: LoadState, guesses: Sequence[Guess], force: float | None = None
+) -> EquilibriumState:
+    """Return full slip from the first successful one of the guesses. Raises ContactLost where the last one fails."""
+    for guess, rounds in guesses[:-1]:
         with suppress(ContactLost):
-            state = slide_from_guess(newton, load, guess, force)
+            state = slide_from_guess(newton, load, guess, force, rounds)
             if force is None or state.load.depth > 0.0:
                 return state
-    return slide_from_guess(newton, load, guesses[-1], force)
+    return slide_from_guess(newton, load, guesses[-1][0], force)

@@ -339,14 +339,14 @@ class HalvedMesh:
         new = _VALUES[local_number]
         # A new node is driven if all nodes of its side, or of its element, are.
         held = mesh.driven[elements[host]] | (new == 0.0)[..., None]
-        driven = np.concatenate([mesh.driven, held.all(axis=1)])
+        x, y = np.concatenate([mesh.driven, held.all(axis=1)]).T
         nodes = np.concatenate([mesh.nodes, np.einsum("mn,mnd->md", new, mesh.nodes[elements[host]])])
         halved = Mesh(
             nodes,
             grid[:, _QUARTERS].reshape(-1, 9),
             np.repeat(mesh.region, 4),
             _refine_chain(mesh.skin, pairs, count),
-            *_by_axis(driven),
+            *(np.flatnonzero(which) for which in (x & y, x & ~y, y & ~x)),
         )
         return HalvedMesh(halved, mesh, pairs, new, host)
 
@@ -371,12 +371,6 @@ def _refine_chain(nodes: Indices, pairs: Indices, count: int) -> Indices:
     out = np.empty(max(2 * len(nodes) - 1, 0), np.int64)
     out[::2], out[1::2] = nodes, count + np.searchsorted(pairs, _pair(ends, middles, count))
     return out
-
-
-def _by_axis(driven: Flags) -> tuple[Indices, Indices, Indices]:
-    """Return the nodes driven both ways, along x alone and along y alone, from flags (n, 2)."""
-    x, y = driven.T
-    return np.flatnonzero(x & y), np.flatnonzero(x & ~y), np.flatnonzero(y & ~x)
 
 
 ELEMENTS = (Q2P1,)

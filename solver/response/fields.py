@@ -19,7 +19,7 @@ from solver.mesh.mesher import Outline
 from solver.prediction import Prediction, Skin, SkinLine
 from solver.progress import Progress, report_part
 from solver.quantities import FIELDS, SED
-from solver.response.answer import skin_of
+from solver.response import skin_of
 from solver.scene import Scene
 
 # Eight triangles of each element, in its nine nodes

@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from time import perf_counter
 
-from solver.accuracy import audits
+from solver.accuracy import audits, order_of
 from solver.accuracy.adaptivity import choose_steps, steps_of_press, with_shares
-from solver.accuracy.convergence_order import order_of
 from solver.accuracy.error_estimate import NO_NESTED_STATE, NestedState, Steps, edge_changes, nested_state
 from solver.arrays import Array
 from solver.continuation.existence import limit_warnings, refuse_far_beyond
@@ -24,7 +23,7 @@ from solver.mesh import Fineness, Lines
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
 from solver.progress import check_stop, report_progress
-from solver.response.answer import (
+from solver.response import (
     FIRST_FINENESS,
     Answers,
     LoadingGroup,

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from solver._kernels.compiling import SHEAR_LIMITED, SLIP, STICK
+from solver._kernels import SHEAR_LIMITED, SLIP, STICK
 from solver._kernels.contact_system import assemble_contact_system, bounded_length, tributary
 from solver.arrays import Array, ContactStates, SkinPosition
 from solver.body import Patches

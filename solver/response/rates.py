@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver.accuracy.convergence_order import order_of
+from solver.accuracy import order_of
 from solver.accuracy.error_estimate import PARTS, edge_changes, half_width
 from solver.arrays import Array
 from solver.contact import ForceLoad
@@ -21,7 +21,7 @@ from solver.equilibrium.load_path import PRESSING_TIME, LoadPath, march_scene
 from solver.failures import SolveFailure
 from solver.prediction import History, Prediction
 from solver.quantities import NAMES
-from solver.response.answer import history
+from solver.response import history
 from solver.scene import Scene
 
 FULL_SLIP = 1.0 - 1e-9  # part of the touching nodes that slips when all do [-]

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver.accuracy.convergence_order import order_of
+from solver.accuracy import order_of
 from solver.accuracy.error_estimate import PARTS, Steps, edge_changes, half_width
 from solver.arrays import Array
 from solver.body import Patches
@@ -26,7 +26,7 @@ from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import ROW, Prediction
 from solver.quantities import NAMES
-from solver.response.answer import FIRST_FINENESS
+from solver.response import FIRST_FINENESS
 from solver.response.finite_answers import WIDER, Meshes, coarse_solution, solution_on
 from solver.scene import Scene
 from solver.scene.tables import Receptor

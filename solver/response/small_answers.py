@@ -10,9 +10,8 @@ from time import perf_counter
 
 import numpy as np
 
-from solver.accuracy import audits
+from solver.accuracy import audits, order_of
 from solver.accuracy.adaptivity import choose_steps, steps_of_press, with_shares
-from solver.accuracy.convergence_order import order_of
 from solver.accuracy.error_estimate import NO_NESTED_STATE, Steps, edge_changes, nested_state
 from solver.arrays import Array
 from solver.continuation.small_states import (
@@ -32,7 +31,7 @@ from solver.mesh import Fineness
 from solver.mesh.mesher import Sizing
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction
 from solver.progress import check_stop
-from solver.response.answer import Answers, Meshing, Scenes, SceneSolution, Watch, complete_audits, prediction
+from solver.response import Answers, Meshing, Scenes, SceneSolution, Watch, complete_audits, prediction
 from solver.scene import Scene
 
 SMALL_IMBALANCE = 1e-10  # relative residual of the forces from which a state is refined [-]

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from solver._kernels.contact_system import SHEAR_LIMITED_MU
+from solver.accuracy import trial_warnings
 from solver.accuracy.adaptivity import refine_lines
-from solver.accuracy.convergence_order import trial_warnings
 from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error
 from solver.accuracy.omitted_effects import COARSE, Answer, measure_differences, with_viscosity
 from solver.equilibrium.finger import LinearFinger
@@ -17,7 +17,7 @@ from solver.mesh import Fineness
 from solver.mesh.mesher import FingerMesh
 from solver.prediction import Prediction, percent
 from solver.progress import Progress, check_stop, interruptible, report_progress
-from solver.response.answer import FIRST_FINENESS, Answers, Meshing, Scenes, Watch
+from solver.response import FIRST_FINENESS, Answers, Meshing, Scenes, Watch
 from solver.response.finite_answers import FiniteMeshing
 from solver.response.small_answers import SmallMeshing
 from solver.scene import Scene
@@ -310,7 +310,6 @@ def _sentences(
 
 
 def _add_warnings(answer: Answer, sentences: tuple[str, ...]) -> Answer:
-    """Return the answer with further warnings."""
     return (
         replace(answer, warnings=(*answer.warnings, *sentences))
         if sentences and isinstance(answer, Prediction)

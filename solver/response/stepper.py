@@ -12,7 +12,7 @@ from math import isfinite
 
 import numpy as np
 
-from solver._kernels.compiling import OPEN, SLIP, STICK
+from solver._kernels import OPEN, SLIP, STICK
 from solver.arrays import Array
 from solver.body import Endings, Patches, Probes
 from solver.contact import ForceLoad, LoadState

@@ -29,7 +29,6 @@ class SceneError(ValueError):
         self.allowed = allowed
 
     def __str__(self) -> str:
-        """Return the sentence."""
         return f"{self.key} = {self.value!r} is not allowed: {self.allowed}."
 
 
@@ -38,7 +37,6 @@ class Table:
     """A table of a scene. NumPy's numbers become Python's; lists and arrays become tuples."""
 
     def __post_init__(self) -> None:
-        """Convert the values."""
         for f in fields(self):
             object.__setattr__(self, f.name, _plain(getattr(self, f.name)))
 
@@ -252,7 +250,6 @@ class Friction(Table):
     tau_max: float | None = None  # traction bound [MPa]; None: no bound
 
     def __post_init__(self) -> None:
-        """Check ranges."""
         Table.__post_init__(self)
         if self.mu != 0.0:
             _within("friction.mu", self.mu, MIN_FORCE, 1000.0, zero=True)
@@ -343,7 +340,6 @@ class Receptor(Table):
     ending: tuple[float, float] = (0.2, 1.0)  # its size across and along the skin [mm]
 
     def __post_init__(self) -> None:
-        """Check ranges."""
         Table.__post_init__(self)
         _within("receptor.depth", self.depth, 1e-3, 50.0, "mm")
         if not _are_two_within(self.ending, 1e-3, 20.0):
@@ -374,7 +370,6 @@ class Solve(Table):
         return usual if self.tolerance is None else self.tolerance
 
     def __post_init__(self) -> None:
-        """Check the options. Raises SceneError."""
         Table.__post_init__(self)
         if self.kinematics not in ("small", "finite"):
             raise SceneError("solve.kinematics", self.kinematics, 'it must be "small" or "finite"')

@@ -13,7 +13,7 @@ from solver.equilibrium.load_path import end_of_path
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
-from solver.response.answer import FIRST_FINENESS
+from solver.response import FIRST_FINENESS
 from solver.response.finite_answers import WIDER, Meshes, coarse_solution, solution_on
 from solver.response.solution import solve_many
 from solver.scene import Scene

@@ -18,7 +18,7 @@ from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, settle
 from solver.equilibrium.load_stepping import sliding_load
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
-from solver.response.answer import FIRST_FINENESS
+from solver.response import FIRST_FINENESS
 from solver.response.finite_answers import CONTACT_MARGIN
 from solver.scene import Scene
 from solver.verification.request import clock

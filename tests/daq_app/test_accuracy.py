@@ -17,7 +17,7 @@ from daq_app.accuracy_page.page import Table, filled_pages, tables, write
 from daq_app.child_process import interpreter
 from daq_app.cli.main import run
 from solver import NotConverged, solve
-from solver.response.answer import FIRST_FINENESS
+from solver.response import FIRST_FINENESS
 from solver.verification import estimates, processes, targets
 from solver.verification.costs import Cost
 from solver.verification.estimates import Estimate, GuaranteedCost

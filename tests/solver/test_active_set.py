@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver import ContactLost, Finger, Loading, Receptor
-from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.linear import LinearBody
 from solver.constitutive import Hooke
 from solver.contact import ForceLoad, FrictionLaw, LoadState

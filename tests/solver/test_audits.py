@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, NotConverged
-from solver._kernels.compiling import SLIP
+from solver._kernels import SLIP
 from solver.accuracy.audits import audits, force_residuals
 from solver.continuation.small_states import settled_state
 from solver.equilibrium.finger import LinearFinger

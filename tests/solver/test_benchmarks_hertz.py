@@ -6,7 +6,7 @@ K. L. Johnson, Contact Mechanics, Cambridge 1985, chapters 4, 5 and 7. The bodie
 import numpy as np
 import pytest
 
-from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
 from solver.contact import FrictionLaw
 from solver.verification.published import contacts, problems
 from solver.verification.published.contacts import ELEMENT

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, Material, Materials, Scene
-from solver._kernels.compiling import SHEAR_LIMITED, SLIP
+from solver._kernels import SHEAR_LIMITED, SLIP
 from solver.contact import FrictionLaw, LoadState
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import LinearFinger

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from solver import ContactLost
-from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body import Probes
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive import MATERIALS, Hooke

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from solver._kernels import compiling
+from solver import _kernels as compiling
 
-CODE = "import solver._kernels.compiling, os; print(os.environ['NUMBA_CACHE_DIR'])"
+CODE = "import solver._kernels, os; print(os.environ['NUMBA_CACHE_DIR'])"
 
 
 def cache_folder_of(folder, umask=-1):

@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 
 from solver import _kernels
-from solver._kernels import compiling, contact_system
-from solver._kernels.compiling import bind_arguments
+from solver import _kernels as compiling
+from solver._kernels import bind_arguments, contact_system
 from solver.progress import listening, report_progress
 
 SCRIPT = """
 import numpy as np
 from solver._kernels import contact_system
-from solver._kernels.compiling import bind_arguments
+from solver._kernels import bind_arguments
 from solver.progress import listening
 out = np.zeros(3)
 with listening(lambda doing, _: print(doing)):

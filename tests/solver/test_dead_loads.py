@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver._kernels.compiling import SLIP
+from solver._kernels import SLIP
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive import Hooke, NeoHooke, stress

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, Scene, Solve
-from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body import CondensedLinear, Endings, Probes
 from solver.body.finite import FiniteBody, FinitePatches
 from solver.constitutive import NeoHooke, Ogden

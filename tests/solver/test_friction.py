@@ -7,8 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from solver._kernels import active_set
-from solver._kernels.compiling import compile_loop
+from solver._kernels import active_set, compile_loop
 from solver.arrays import ContactStates, LoadArguments, StateChanges
 from solver.body import CondensedLinear
 from solver.body.finite import FiniteBody

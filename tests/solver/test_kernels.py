@@ -7,9 +7,8 @@ import sys
 import numpy as np
 import pytest
 
-from solver._kernels import contact_system
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK, compile_loop, contact_system
 from solver._kernels import elements as element_loops
-from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, compile_loop
 from solver.body.finite import CondensedFinite, FiniteBody
 from solver.constitutive import LAWS, NeoHooke
 from solver.contact import LoadState

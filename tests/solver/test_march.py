@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from solver._kernels.compiling import SLIP, STICK
+from solver._kernels import SLIP, STICK
 from solver.accuracy.audits import course_audits
 from solver.contact import LoadState
 from solver.equilibrium import EquilibriumState

@@ -10,7 +10,7 @@ from solver.equilibrium.finger import KINDS
 from solver.equilibrium.load_path import march_scene
 from solver.prediction import History
 from solver.quantities import NAMES
-from solver.response.answer import history
+from solver.response import history
 from solver.response.rates import course_errors, course_numbers, rates
 
 RELAXING = Scene(

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
 from solver.body.finite import FiniteBody
 from solver.constitutive import NeoHooke
 from solver.contact import LoadState

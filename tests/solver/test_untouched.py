@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver._kernels.compiling import STICK
+from solver._kernels import STICK
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive import Hooke
 from solver.contact import LoadState
