@@ -12,8 +12,7 @@ from numpy.linalg import LinAlgError
 from solver._kernels import elements as element_loops
 from solver._kernels.multifrontal import DEFINITE
 from solver.arrays import Array, ElementSystem, Indices, determinant, inverse
-from solver.body import CondensedLinear, MeshElements, Patches, Probes, held_directions, integrate_elements
-from solver.body.validation import BodyError, check_body, check_held, check_loads, unprevented_motions
+from solver.body import CondensedLinear, MeshElements, Patches, Probes, held_directions, integrate_elements, validation
 from solver.constitutive import Elasticity
 from solver.linalg import ElementSubset, Elimination, symbolic_factorization
 from solver.mesh import GAUSS_4, Q2P1, Mesh, jacobians, line
@@ -158,9 +157,9 @@ class LinearBody:
         `checked` before, and LinAlgError where a rigid motion is neither held nor free.
         """
         if not checked:
-            check_body(mesh, materials)
-            check_loads(mesh, loads, prescribed)
-            check_held(mesh, free)
+            validation.check_body(mesh, materials)
+            validation.check_loads(mesh, loads, prescribed)
+            validation.check_held(mesh, free)
         elimination = LinearElimination(mesh, materials)
         displacement = np.zeros(mesh.nodes.shape) if prescribed is None else np.array(prescribed, np.float64)
         force = np.zeros(mesh.nodes.shape) if loads is None else np.array(loads, np.float64)
@@ -310,12 +309,11 @@ class LinearPatches(Patches):
 def _condense_skin(mesh: Mesh, stiffness: Array, load: Array, free: Sequence[Motion]) -> CondensedLinear:
     """Return the condensed body with a `stiffness` (2 k, 2 k) and dead `load` (2 k,) of its skin."""
     place = mesh.nodes[mesh.skin]
-    (x, y), ones, zeros = place.T, np.ones(len(place)), np.zeros(len(place))
-    shapes = {"x": np.c_[ones, zeros].ravel(), "y": np.c_[zeros, ones].ravel(), "turn": np.c_[-y, x].ravel()}
-    rigid = np.stack(list(shapes.values()), axis=1) @ unprevented_motions(mesh)
+    motions = validation.rigid_motions(place)
+    rigid = motions @ validation.unprevented_motions(mesh)
     skin = CondensedLinear(place, stiffness, load, skin_lengths(mesh), held_directions(mesh))
     skin.springs = np.linalg.qr(rigid)[0] if rigid.shape[1] else rigid
-    skin.motions = np.stack([shapes[name] for name in free], axis=1) if free else np.zeros((2 * len(place), 0))
+    skin.motions = motions[:, [validation.MOTIONS.index(name) for name in free]]
     return skin
 
 
@@ -330,7 +328,7 @@ def edge_load(mesh: Mesh, chain: Indices, traction: Array) -> Array:
     Raises BodyError unless the chain has whole edges and each node has one traction.
     """
     if len(chain) != len(traction) or (len(chain) and (len(chain) < 3 or len(chain) % 2 == 0)):
-        raise BodyError(
+        raise validation.BodyError(
             f"the chain has {len(chain)} nodes and {len(traction)} tractions; name whole edges, from end by middle to "
             "end, and so on, and give a traction for each node"
         )

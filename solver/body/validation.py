@@ -176,13 +176,17 @@ def finite(name: str, value: float) -> float:
     return float(value)
 
 
+def rigid_motions(points: Array) -> Array:
+    """Return the displacements (2 n, 3) of points (n, 2) by each of MOTIONS: along x, along y, and by a turn."""
+    (x, y), ones, zeros = points.T, np.ones(len(points)), np.zeros(len(points))
+    return np.stack([np.c_[ones, zeros].ravel(), np.c_[zeros, ones].ravel(), np.c_[-y, x].ravel()], axis=1)
+
+
 def unprevented_motions(mesh: Mesh) -> Array:
     """Return a basis (3, r) of the rigid motions that no held node prevents, as combinations of MOTIONS."""
     if len(distinct(mesh.held)) > 1:
         return np.zeros((3, 0))
-    x, y = (mesh.nodes / np.ptp(mesh.nodes)).T
-    ones, zeros = np.ones_like(x), np.zeros_like(x)
-    moves = np.stack([np.c_[ones, zeros].ravel(), np.c_[zeros, ones].ravel(), np.c_[-y, x].ravel()], axis=1)[mesh.fixed]
+    moves = rigid_motions(mesh.nodes / np.ptp(mesh.nodes))[mesh.fixed]
     _, sizes, ways = np.linalg.svd(np.concatenate([moves, np.zeros((3, 3))]), full_matrices=False)
     ways[:, 2] /= np.ptp(mesh.nodes)
     return ways[sizes[:3] < CUT * np.sqrt(len(mesh.fixed) + 1.0)].T

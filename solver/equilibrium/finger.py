@@ -356,13 +356,10 @@ def _inner(lines: Array) -> Array:
 
 def _heights(finger: FingerMesh) -> Array:
     """Return the heights of the nodes of a column: 0 on the bone, 1 between fat and skin, 2 on the outside."""
-    wide = 2 * (finger.fat + len(finger.depths) - 1) + 1
     fat = finger.mesh.nodes[: 2 * finger.fat + 1]
     distance = np.linalg.norm(fat - fat[0], axis=1)
     outer = 2.0 - with_middles(finger.depths) / finger.depths[0]
-    out = np.concatenate([distance / distance[-1], outer[1:]])
-    assert len(out) == wide
-    return out
+    return np.concatenate([distance / distance[-1], outer[1:]])
 
 
 def _piece(ends: Array, points: Array) -> Indices:

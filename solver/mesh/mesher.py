@@ -328,13 +328,10 @@ class _Row:
         least = tuple(2 if end in (outline.palmar_cut, outline.dorsal) else 1 for end in ends[:-1])
         return _Row(arc, _cumulative_count(arc, sizes), ends, least, 0.2)
 
-    def sizes(self) -> Array:
-        """Return the required number of elements between consecutive ends, fractions included."""
-        return np.diff(np.interp(self.ends, self.place, self.number))
-
     def gaps(self) -> tuple[int, ...]:
         """Return the number of elements between consecutive ends."""
-        return tuple(max(low, ceil(n - self.spare)) for low, n in zip(self.least, self.sizes().tolist(), strict=True))
+        numbers = np.diff(np.interp(self.ends, self.place, self.number)).tolist()
+        return tuple(max(low, ceil(n - self.spare)) for low, n in zip(self.least, numbers, strict=True))
 
     def lines(self, gaps: Sequence[int], *, shift: bool = False) -> Array:
         """Return the lines for `gaps` elements between consecutive ends; `shift` moves them by half an element."""

@@ -53,23 +53,6 @@ class Derivatives:
     responses: Mapping[str, Gradient]  # of every quantity at the ending, by name
 
 
-def slide_derivatives(finger: Finger[Patches], scene: Scene, state: EquilibriumState) -> Derivatives:
-    """Return the derivatives at full slip, under a given depth or force.
-
-    Raises ValueError where points stick, because such a state depends on its load path, and where it has no tangent.
-    """
-    skin = skin_derivatives(finger.newton, state)
-    along, up = finger.newton.force_changes(skin)
-    ending = response_derivatives(finger.ending, finger.displacement(state), finger.body.recover_increments(skin))[:, 0]
-    rows = np.array([*ending, up, drag_sign(scene) * along, [0.0, 0.0, 1.0]]) + 0.0  # never -0
-    if scene.normal_force is None:
-        return _derivatives([Gradient(mu, tau, depth, None) for mu, tau, depth in rows.tolist()])
-    rows[:, 2] /= up[2]  # the depth changes so that the force stays
-    rows[:, :2] -= rows[:, 2:] * up[:2]
-    derivatives = _derivatives([Gradient(mu, tau, None, force) for mu, tau, force in rows.tolist()])
-    return replace(derivatives, normal=Gradient(0.0, 0.0, None, 1.0))
-
-
 def _derivatives(rows: Sequence[Gradient]) -> Derivatives:
     """Return the derivatives of every quantity, of both forces and of the indentation."""
     by_name = dict(zip(NAMES, rows, strict=False))
@@ -130,11 +113,6 @@ def response_derivatives(endings: Patches, displacement: Array, steps: Array) ->
     return endings.responses(perturbed).imag / IMAGINARY
 
 
-def drag_sign(scene: Scene) -> int:
-    """Return the sign along +x of the drag that opposes the slide of a scene."""
-    return -(scene.loading.direction or 1)
-
-
 _TOLERANCE = 1e-9  # tolerance of displacements [-], far below the effect of any measurable difference of friction
 _STATE_NUMBERS = {name: state for state, name in STATE_NAMES.items()}
 
@@ -148,8 +126,24 @@ class Nearby:
     finger: Finger[Any]
 
     def derivatives(self) -> Derivatives:
-        """Return the derivatives of the slide from the tangent at convergence."""
-        return slide_derivatives(self.finger, self.scene, self.state)
+        """Return the derivatives of the slide from the tangent at convergence, under a given depth or force.
+
+        Raises ValueError where points stick, because such a state depends on its load path, and where it has no
+        tangent.
+        """
+        finger, state = self.finger, self.state
+        skin = skin_derivatives(finger.newton, state)
+        along, up = finger.newton.force_changes(skin)
+        increments = finger.body.recover_increments(skin)
+        ending = response_derivatives(finger.ending, finger.displacement(state), increments)[:, 0]
+        drag = -(self.scene.loading.direction or 1) * along  # opposes the slide
+        rows = np.array([*ending, up, drag, [0.0, 0.0, 1.0]]) + 0.0  # never -0
+        if self.scene.normal_force is None:
+            return _derivatives([Gradient(mu, tau, depth, None) for mu, tau, depth in rows.tolist()])
+        rows[:, 2] /= up[2]  # the depth changes so that the force stays
+        rows[:, :2] -= rows[:, 2:] * up[:2]
+        derivatives = _derivatives([Gradient(mu, tau, None, force) for mu, tau, force in rows.tolist()])
+        return replace(derivatives, normal=Gradient(0.0, 0.0, None, 1.0))
 
     def seds(self, scenes: Sequence[Scene]) -> Array:
         """Return the SED (n, 2) [MPa] of scenes, as `responses` does."""

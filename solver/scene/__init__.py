@@ -4,7 +4,8 @@ Each table (`scene.tables`) checks itself. This module checks combinations of ta
 """
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
+from typing import cast
 
 from solver.scene.tables import (
     LAWS_OF,
@@ -22,11 +23,6 @@ from solver.scene.tables import (
 
 STIFFNESSES = 1e10  # largest ratio of two tissues' stiffnesses: beyond it, round-off swamps the softer one
 
-_TABLES = {
-    "finger": Finger, "materials": Materials, "friction": Friction, "loading": Loading, "receptor": Receptor,
-    "solve": Solve,
-}  # fmt: skip
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
@@ -42,9 +38,10 @@ class Scene:
 
     def __post_init__(self) -> None:
         """Check the types of the tables, and their combinations. Raises SceneError."""
-        for name, table in _TABLES.items():
-            if not isinstance(getattr(self, name), table):
-                raise SceneError(name, getattr(self, name), f"it must be a {table.__name__}")
+        for table in fields(self)[1:]:
+            kind, value = cast("type", table.type), getattr(self, table.name)
+            if not isinstance(value, kind):
+                raise SceneError(table.name, value, f"it must be a {kind.__name__}")
         self._check_laws()
         self._check_stiffnesses()
         skin = self.finger.epidermis + self.finger.dermis

@@ -115,11 +115,6 @@ class Finger(Table):
                 f"{self.fat_thickness():.3g} mm",
             )
 
-    @property
-    def core_radius(self) -> float:
-        """Radius of the inner side of the dermis [mm]."""
-        return self.tip_radius - self.epidermis - self.dermis
-
     def fat_thickness(self) -> float:
         """Return the least distance from bone to dermis [mm]; negative where the bone reaches through the fat.
 
@@ -129,7 +124,7 @@ class Finger(Table):
         0.75
         """
         x, y = self.bone_centre
-        return self.core_radius - math.hypot(max(x, 0.0), y) - self.bone_radius
+        return self.tip_radius - self.epidermis - self.dermis - math.hypot(max(x, 0.0), y) - self.bone_radius
 
     def pulp_thickness(self) -> float:
         """Return the distance from the point of first touch to the end of the bone [mm].

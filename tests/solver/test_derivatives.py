@@ -19,7 +19,7 @@ from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.load_stepping import solve_full_slip, solve_under_forces
 from solver.mesh.mesher import Sizing
 from solver.quantities import QUANTITIES
-from solver.response.nearby import response_derivatives, skin_derivatives, slide_derivatives
+from solver.response.nearby import Nearby, response_derivatives, skin_derivatives
 from tests.solver.finite_examples import block
 
 NAMES = ("mu", "tau_max", "press")
@@ -95,7 +95,7 @@ def test_at_small_strain_they_are_the_differences_of_solves_within_one_set_of_st
         return small_numbers(small, changed_scene, contact.state)
 
     steps = (2e-5, 2e-7 if slide.friction.tau_max else 0.0, 2e-5)
-    table = derivative_table(slide_derivatives(small, slide, contact))
+    table = derivative_table(Nearby(slide, contact, small).derivatives())
     assert_tables_agree(table, differences(numbers, slide, steps), numbers(slide))
 
 
@@ -103,14 +103,14 @@ def test_between_changes_of_state_forces_are_straight_in_the_depth_and_the_sed_a
     # Closed form: a slope of a straight line and of a parabola are those of their chords, however long.
     slide = SMALL["beside its limit"]
     contact = settled_state(slide, small)
-    derivatives = slide_derivatives(small, slide, contact)
+    derivatives = Nearby(slide, contact, small).derivatives()
     chord_ends = [small_numbers(small, vary(slide, "press", by), contact.state) for by in (-5e-3, 5e-3)]
     assert (chord_ends[1] - chord_ends[0])[:3] / 1e-2 == pytest.approx(derivative_table(derivatives)[:3, 2], rel=1e-9)
 
 
 def test_a_given_force_drags_with_mu_times_it(small):
     slide = SMALL["under a force"]
-    derivatives = slide_derivatives(small, slide, settled_state(slide, small))
+    derivatives = Nearby(slide, settled_state(slide, small), small).derivatives()
     assert derivatives.tangential.mu == pytest.approx(0.12, rel=1e-12)
     assert derivatives.tangential.normal_force == pytest.approx(0.4, rel=1e-12)
     assert derivatives.normal == (0.0, 0.0, None, 1.0)
@@ -154,7 +154,7 @@ def test_at_a_kink_each_side_has_the_slope_of_its_own_states(small):
     for side, depth in ((-1.0, low), (1.0, high)):
         far, near = (small.numbers([solve_at(depth + side * by)])[0, 0] for by in (1e-3, 0.0))
         slope, far_slope = (
-            slide_derivatives(small, vary(slide, "press", touch_depth - 1.2), solve_at(touch_depth)).sed.indentation
+            Nearby(vary(slide, "press", touch_depth - 1.2), solve_at(touch_depth), small).derivatives().sed.indentation
             for touch_depth in (depth, depth + side * 1e-3)
         )
         assert side * (far - near) / 1e-3 == pytest.approx((slope + far_slope) / 2.0, rel=1e-6)  # a parabola's chord
@@ -167,7 +167,7 @@ def test_a_state_that_sticks_has_no_derivatives_of_its_own(small):
     contact = settled_state(SMALL["without a bound"], small)
     sticking_state = replace(contact, state=np.where(contact.state == SLIP, STICK, contact.state).astype(np.int32))
     with pytest.raises(ValueError, match="depends on its load path"):
-        slide_derivatives(small, SMALL["without a bound"], sticking_state)
+        Nearby(SMALL["without a bound"], sticking_state, small).derivatives()
 
 
 # Finite strain
@@ -214,7 +214,7 @@ def test_at_finite_strain_they_are_the_differences_of_solves_within_one_set_of_s
         return finite_numbers(finite, changed_scene, state)
 
     steps = (1e-5, 1e-7 if slide.friction.tau_max else 0.0, 1e-5)
-    table = derivative_table(slide_derivatives(finite, slide, state))
+    table = derivative_table(Nearby(slide, state, finite).derivatives())
     assert_tables_agree(table, differences(numbers, slide, steps), numbers(slide))
 
 
@@ -265,4 +265,4 @@ def test_a_state_that_is_no_slide_has_no_derivatives_of_its_own(finite):
     slide = FINITE["without a bound"]
     state = slip(finite, slide)
     with pytest.raises(ValueError, match="depends on its load path"):
-        slide_derivatives(finite, slide, replace(state, load=state.load._replace(sense=0)))
+        Nearby(slide, replace(state, load=state.load._replace(sense=0)), finite).derivatives()
