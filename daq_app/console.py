@@ -36,9 +36,10 @@ class EndlessProgress:
             self.task, self._start = task, self.fraction
         self.reach(self._start + 0.5 * fraction * (1.0 - self._start))
 
-    def reach(self, fraction: float) -> None:
-        """Advance to this fraction of the whole, at most 99 %, and never back."""
+    def reach(self, fraction: float) -> bool:
+        """Advance to this fraction of the whole, at most 99 %, and never back; return True."""
         self.fraction = max(self.fraction, min(fraction, 0.99))
+        return True
 
 
 class WrongValue(Exception):
@@ -184,10 +185,6 @@ class Console:
         start, finish = time.monotonic(), threading.Event()
         underway = EndlessProgress(text)
 
-        def reach(fraction: float) -> bool:
-            underway.reach(fraction)
-            return True
-
         def show() -> None:
             pause = _PATIENCE
             while not finish.wait(pause):
@@ -199,7 +196,7 @@ class Console:
         shower.start()
         try:
             with listening(underway.hear):
-                yield reach
+                yield underway.reach
         finally:
             finish.set()
             shower.join()

@@ -33,10 +33,8 @@ def translations(context: str, language: str) -> Mapping[str, str]:
 
 def languages(context: str) -> tuple[str, ...]:
     """Return the languages that a context is translated into, English first."""
-    return (
-        SOURCE_LANGUAGE,
-        *sorted(file.stem.removeprefix(f"{context}_") for file in _FOLDER.glob(f"{context}_*.xlf")),
-    )
+    names = (file.stem for file in _FOLDER.glob(f"{context}_*.xlf"))
+    return (SOURCE_LANGUAGE, *sorted(name.removeprefix(f"{context}_") for name in names))
 
 
 def tr(text: str, /, **values: object) -> str:

@@ -1,4 +1,4 @@
-"""The figures of the accuracy page, each with its numbers."""
+"""The figures of the accuracy page."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import cycle
@@ -41,27 +41,22 @@ def _strain_legend(axes: Axes, strains: Iterable[str], location: Literal["upper 
 def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, title: str) -> style.Panel | None:
     sheet = style.sheet(*SQUARE)
     axes = sheet.axes[0]
-    table: list[tuple[str | float, ...]] = []
     for kinematics, group in _by_strain(rows).items():
-        spans = [(row.judged_error, getattr(row, time), row) for row in group]
-        timings = [(error, 1e3 * span, row) for error, span, row in spans if error is not None and span is not None]
-        if not timings:
-            continue
+        spans = ((row.judged_error, getattr(row, time), row.dofs) for row in group)
         points = [
-            (error, span, error < 3.0 * doubt[kinematics], f"{kinematics} strain: {row.dofs} unknowns, ", "")
-            for error, span, row in timings
+            (error, 1e3 * span, error < 3.0 * doubt[kinematics], f"{kinematics} strain: {dofs} unknowns, ", "")
+            for error, span, dofs in spans
+            if error is not None and span is not None
         ]
-        _curve(sheet, kinematics, points)
-        table += [(kinematics, row.dofs, error, 1e-3 * span) for error, span, row in timings]
-        error, span, _ = timings[-1]
-        colour, position = _COLOURS[kinematics], (100 * error, span)
-        axes.annotate(f"{kinematics} strain", position, xytext=(4, 5), textcoords="offset points", color=colour)
-    if not table:
+        if points:
+            _curve(sheet, kinematics, points)
+            colour, position = _COLOURS[kinematics], (100 * points[-1][0], points[-1][1])
+            axes.annotate(f"{kinematics} strain", position, xytext=(4, 5), textcoords="offset points", color=colour)
+    if not axes.lines:
         return None
     _logarithmic(axes)
     axes.set(xlabel="true error of the SED [%]", ylabel="time [ms]", title=title)
-    header = ("kinematics", "unknowns", "largest true error [-]", "median time [s]")
-    return sheet.panel(f"speed-{time.removesuffix('_s')}", f"Time against true error, {title}", header, table)
+    return sheet.panel(f"speed-{time.removesuffix('_s')}", f"Time against true error, {title}")
 
 
 def _curve(sheet: style.Sheet, kinematics: str, points: Sequence[tuple[float, float, bool, str, str]]) -> None:
@@ -91,22 +86,12 @@ def _guaranteed_panel(rows: Sequence[GuaranteedCost]) -> style.Panel:
     _strain_legend(axes, by_strain, "upper right")
     title = "surfaces solved to a tolerance"
     axes.set(xlabel="guaranteed, and true, error of the SED [%]", ylabel="time for a surface [ms]", title=title)
-    header = (
-        "kinematics", "tolerance [-]", "surfaces", "unknowns", "guaranteed error [-]", "largest true error [-]",
-        "time for a surface [s]",
-    )  # fmt: skip
-    table = [
-        (cost.kinematics, cost.tolerance, cost.surfaces, cost.dofs, cost.worst_estimate,
-         "not known" if cost.worst_error is None else cost.worst_error, cost.took_s / cost.surfaces)
-        for cost in rows
-    ]  # fmt: skip
-    return sheet.panel("speed-guaranteed", f"Time against guaranteed error, {title}", header, table)
+    return sheet.panel("speed-guaranteed", f"Time against guaranteed error, {title}")
 
 
 def _order_panel(rows: Sequence[Order], *, timed: bool) -> style.Panel:
     sheet = style.sheet(*_WIDE)
     axes = sheet.axes[0]
-    table: list[tuple[str | float, ...]] = []
     colours = {"displacement": style.SKY, "stress": style.PURPLE, "energy": style.GREY, "force": style.VERMILLION}
     for row in rows:
         x, y = (row.errors, row.took_s) if timed else (row.sizes, row.errors)
@@ -116,10 +101,6 @@ def _order_panel(rows: Sequence[Order], *, timed: bool) -> style.Panel:
             x, y, dashes, marker=_mark(row.problem), color=colours.get(row.quantity, style.GREEN), markersize=3.5,
             linewidth=0.9, gid=sheet.note(note),
         )  # fmt: skip
-        table += [
-            (row.problem, row.quantity, row.kinematics, size, error, span)
-            for size, error, span in zip(row.sizes, row.errors, row.took_s, strict=True)
-        ]
     for quantity in dict.fromkeys(row.quantity for row in rows):
         axes.plot([], [], "-", color=colours.get(quantity, style.GREEN), label=quantity)
     for problem_name in dict.fromkeys(row.problem.split(",")[0] for row in rows):
@@ -128,12 +109,11 @@ def _order_panel(rows: Sequence[Order], *, timed: bool) -> style.Panel:
         axes.plot([], [], "--", color=style.GREY, label="finite strain")
     axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     _logarithmic(axes)
-    header = ("problem", "quantity", "kinematics", "element size", "error [-]", "time of a solve [s]")
     if timed:
         axes.set(xlabel="error [–]", ylabel="time of a solve [s]")
-        return sheet.panel("benchmarks", "Time against true error on published problems", header, table)
+        return sheet.panel("benchmarks", "Time against true error on published problems")
     axes.set(xlabel="element size, by the unit of each problem [–]", ylabel="error [–]")
-    return sheet.panel("orders", "Error against element size", header, table)
+    return sheet.panel("orders", "Error against element size")
 
 
 def _mark(problem: str) -> str:
@@ -160,11 +140,7 @@ def _estimate_panel(rows: Sequence[Estimate]) -> style.Panel:
     _strain_legend(axes, _by_strain(rows), "lower right")
     number = rows[0].number
     axes.set(xlabel="true error [%]", ylabel="estimated error [%]", title=number)
-    header = ("kinematics", "case", "tolerance", "unknowns", "estimate [-]", "true error [-]", "its uncertainty [-]")
-    columns = ("kinematics", "case", "tolerance", "dofs", "estimate", "error", "doubt")
-    table = [tuple(getattr(row, name) for name in columns) for row in rows]
-    name = "estimate-" + number.split()[0].lower()
-    return sheet.panel(name, f"Estimated against true error of the {number}", header, table)
+    return sheet.panel(f"estimate-{number.split()[0].lower()}", f"Estimated against true error of the {number}")
 
 
 def _cost_panel(rows: Sequence[Cost]) -> style.Panel:
@@ -172,15 +148,12 @@ def _cost_panel(rows: Sequence[Cost]) -> style.Panel:
     axes = sheet.axes[0]
     parts = dict.fromkeys(name for row in rows for name in row.parts)
     colours = dict(zip(parts, cycle(_PARTS), strict=False))
-    table: list[tuple[str | float, ...]] = []
     for number, row in enumerate(rows):
         left = 0.0
         for name in parts:
-            share = row.parts.get(name, 0.0)
-            span = 1e3 * share * row.took_s
+            span = 1e3 * row.parts.get(name, 0.0) * row.took_s
             axes.barh(number, span, left=left, color=colours[name], height=0.6)
             left += span
-            table.append((row.kinematics, row.tolerance, row.dofs, name, share, share * row.took_s))
     axes.set_yticks(range(len(rows)))
     axes.set_yticklabels([f"{row.kinematics} strain, {100 * row.tolerance:g} %\n{row.dofs} unknowns" for row in rows])
     axes.invert_yaxis()
@@ -188,8 +161,7 @@ def _cost_panel(rows: Sequence[Cost]) -> style.Panel:
         axes.barh(0, 0, color=colours[name], label=name)
     axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.05))
     axes.set_xlabel("time [ms]")
-    header = ("kinematics", "tolerance", "unknowns", "part", "share [-]", "time [s]")
-    return sheet.panel("costs", "Where the time of a solve goes", header, table)
+    return sheet.panel("costs", "Where the time of a solve goes")
 
 
 def _growth_panel(rows: Sequence[Growth]) -> style.Panel:
@@ -208,9 +180,7 @@ def _growth_panel(rows: Sequence[Growth]) -> style.Panel:
     _logarithmic(axes)
     axes.legend(frameon=False, loc="upper left")
     axes.set(xlabel="unknowns", ylabel="time [ms]")
-    header = ("kinematics", "fineness", "unknowns", "set-up [s]", "assembly, factorisation and solve [s]")
-    table = [(row.kinematics, row.fineness, row.dofs, row.setup_s, row.floor_s) for row in rows]
-    return sheet.panel("growth", "Growth of the time with the unknowns", header, table)
+    return sheet.panel("growth", "Growth of the time with the unknowns")
 
 
 CAPTIONS = {

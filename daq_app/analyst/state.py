@@ -70,7 +70,6 @@ class Excerpt(Struct, frozen=True, eq=False):
 class OtherSession(Struct, frozen=True, eq=False):
     """Another session, with the same analysis and prediction."""
 
-    folder: str
     report: Report
     fingers: Mapping[Key, Frame] = msgspec.field(default_factory=dict[Key, Frame])  # in full slip
 
@@ -345,6 +344,5 @@ def _fold_answer(state: AnalystState, answer: TrialAnswer) -> AnalystState:
     fingers = {present: finger for present, finger in state.fingers.items() if present != key}
     if answer.finger is not None:
         fingers[key] = answer.finger
-    return _keep_row(
-        state, replace(state, report=replace(report, predictions=(*predictions, finding)), fingers=fingers)
-    )
+    report = replace(report, predictions=(*predictions, finding))
+    return _keep_row(state, replace(state, report=report, fingers=fingers))

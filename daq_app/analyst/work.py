@@ -267,7 +267,7 @@ class Work:
 
         prediction = predict(analysis, recording.plan, _options(recording), progress=progress, watch=take_answer)
         self._comparison = findings(recording, analysis, prediction)
-        self._send(m.OtherSession(str(folder), self._comparison, fingers))
+        self._send(m.OtherSession(self._comparison, fingers))
 
     def _write(self, request: m.Write) -> str:
         """Write the report, a picture or an export, and return its path."""

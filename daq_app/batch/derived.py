@@ -67,10 +67,9 @@ def analyse_session(
     else:
         _keep(console, set_gain_error, recording.folder, gain_error)
     settings = settings_of(previous)
-    bootstrap_seed = settings.bootstrap_seed if seed is None else seed
-    analysis = analyse(
-        recording, AnalysisSettings(area=area or settings.area, gain_error=gain_error, bootstrap_seed=bootstrap_seed)
-    )
+    seed = settings.bootstrap_seed if seed is None else seed
+    settings = AnalysisSettings(area=area or settings.area, gain_error=gain_error, bootstrap_seed=seed)
+    analysis = analyse(recording, settings)
     _keep(console, store_derived, recording.folder, ANALYSIS, analysis_document(analysis))
     return analysis
 

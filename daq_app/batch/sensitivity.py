@@ -142,16 +142,9 @@ def saltelli_points(design: Design, samples: int, seed: int) -> Array:
 def sobol_indices(design: Design, answers: Array, seed: int, one_sided: Collection[str] = ()) -> tuple[Index, ...]:
     """Return the index of each number of a design, greatest total first, from `answers` at its `saltelli_points`."""
     analyse: Any = importlib.import_module("SALib.analyze.sobol")
-    result: Any = analyse.analyze(
-        _problem(design),
-        answers,
-        calc_second_order=False,
-        seed=seed + 1,  # SALib treats 0 as no seed
-        num_resamples=200,
-    )
-    columns = zip(
-        design, *(np.asarray(result[name]).tolist() for name in ("S1", "S1_conf", "ST", "ST_conf")), strict=True
-    )
+    settings = {"calc_second_order": False, "seed": seed + 1, "num_resamples": 200}  # SALib treats 0 as no seed
+    result: Any = analyse.analyze(_problem(design), answers, **settings)
+    columns = zip(design, *(result[name].tolist() for name in ("S1", "S1_conf", "ST", "ST_conf")), strict=True)
     indices = [Index(name, *design[name], *values, one_sided=name in one_sided) for name, *values in columns]
     return tuple(sorted(indices, key=lambda index: -index.total))
 

@@ -155,11 +155,8 @@ def body_of(options: argparse.Namespace) -> Body:
     for key in finger:
         if key not in _FINGER:
             raise WrongValue(f"--finger {key} is not known; allowed here: {', '.join(_FINGER)}")
-    return Body(
-        Finger(finger.get("tip_radius"), finger.get("width")),
-        finger.get("contact_angle"),
-        numbers_by_key(options.depth, "--depth", "stickiness=1.9"),
-    )
+    angle, depths = finger.pop("contact_angle", None), numbers_by_key(options.depth, "--depth", "stickiness=1.9")
+    return Body(Finger(**finger), angle, depths)
 
 
 def measures_sentence(plan: SessionPlan) -> str | None:

@@ -14,9 +14,7 @@ def table_texts(report: Report, *sections: str) -> list[str]:
 
 def _as_text(report_table: Table) -> str:
     """Return a table with its caption, each number above its interval, and the notes of its marks."""
-    header = [
-        f"{column.name} [{column.unit}]" if column.unit.strip("1") else column.name for column in report_table.columns
-    ]
+    header = [f"{one.name} [{one.unit}]" if one.unit.strip("1") else one.name for one in report_table.columns]
     rows: list[list[str]] = []
     headings: list[tuple[int, str]] = []  # before which row each group begins
     for group in report_table.groups:

@@ -153,11 +153,8 @@ class Recorder(AbstractContextManager["Recorder"]):
         except subprocess.TimeoutExpired:
             code = None
         cause = f"exit code {code}" if code is None or code >= 0 else f"signal {-code}"
-        return Gone(
-            False,
-            f"the recorder has ended unexpectedly ({cause}){detail}: everything it acknowledged is safe;"
-            " resume the session to continue at the same trial",
-        )
+        outcome = "everything it acknowledged is safe; resume the session to continue at the same trial"
+        return Gone(False, f"the recorder has ended unexpectedly ({cause}){detail}: {outcome}")
 
     def _write(self) -> None:
         """Send requests, in a thread, so that a full pipe blocks nobody else."""

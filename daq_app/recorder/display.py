@@ -102,17 +102,10 @@ class Display:
         if np.any(self._peak > LIMITS) and not self._overload_told:
             self._overload_told = True
             remember_overload(info, tuple(self._peak.tolist()))
-        self._send(
-            Live(
-                self._stream,
-                block.sequence,
-                block.time,
-                block.received_ns,
-                wrench - calibration.wrench(np.array([self._zero]), np.zeros(6)),
-                np.where(info.status.doubtful(block.status), block.status, 0),
-                self._zero,
-            )
-        )
+        net_wrench = wrench - calibration.wrench(np.array([self._zero]), np.zeros(6))
+        doubtful = np.where(info.status.doubtful(block.status), block.status, 0)
+        times = block.sequence, block.time, block.received_ns
+        self._send(Live(self._stream, *times, net_wrench, doubtful, self._zero))
 
     def _tell_health(self, health: Health, now: float, silence: float) -> None:
         while self._arrivals and now - self._arrivals[0][0] > RATE_OVER:
@@ -125,16 +118,8 @@ class Display:
         rated = np.full(6, np.nan) if self._info is None else self._info.calibration.rated
         unknown = np.isnan(np.append(rated, rated.sum()))
         load, peak = np.where(unknown, np.nan, self._load), np.where(unknown, np.nan, self._peak)
-        self._send(
-            HealthReport(
-                health,
-                count / span / self._factor if span > 0.2 * RATE_OVER else 0.0,
-                tuple(load.tolist()),
-                tuple(peak.tolist()),
-                self._saturated,
-                silence,
-            )
-        )
+        rate = count / span / self._factor if span > 0.2 * RATE_OVER else 0.0
+        self._send(HealthReport(health, rate, tuple(load.tolist()), tuple(peak.tolist()), self._saturated, silence))
         self._load = np.zeros(7)
 
 

@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -135,9 +136,12 @@ def simulated_study(parent: Path, seed: int, clock: Clock, console: Console) -> 
         people = SimulatedPeople(SimulatedSubject(subject_seed), clock, bench)
         setting = VisitSetting(frame=bench.frame)
         end = visit(plan(study_protocol, subject, subject_seed + 1, setting=setting), folder, people)
+        assert bench.bench is not None  # `sim:` has one
+        strokes = zip(people.stroke_trials, bench.bench.ground_truth(), strict=True)
+        last = {trial.number: stroke for trial, stroke in strokes}  # of each trial
         ground_truth = tuple(
             GroundTruth(trial, stroke.mu, stroke.tau_max, stroke.speed, stroke.direction)
-            for trial, stroke in people.strokes.items()
+            for trial, stroke in last.items()
         )
     return Study(tuple(scores), folder, ground_truth, end.readings, end.health.lost)
 
@@ -178,21 +182,18 @@ def synthetic_study(parent: Path, seed: int, console: Console, subjects: int = S
     (parent / DAMAGED).mkdir()
     (parent / DAMAGED / LIVE_FILE).write_bytes((parent / "S01" / LIVE_FILE).read_bytes()[:1000])
     (parent / EXCLUSIONS).write_text(_DECISIONS, encoding="utf-8")
-    write_json(
-        parent / GROUND_TRUTH_FILE,
-        {
-            "SIMULATED": "SIMULATED: this is the ground truth of a simulated study",
-            "seed": seed,
-            "score": true_slopes(PEOPLE),
-            "people": asdict(PEOPLE),
-            "calibration_sd": CALIBRATION,
-            "spoilt": {
-                **{code: asdict(faults) for code, faults in FAULTS.items() if int(code[1:]) <= subjects},
-                DAMAGED: asdict(VisitFaults(expected="the file is damaged")),
-            },
-            "strokes": [row for rows in strokes for row in rows],
-        },
-    )
+    faults = {code: fault for code, fault in FAULTS.items() if int(code[1:]) <= subjects}
+    faults[DAMAGED] = VisitFaults(expected="the file is damaged")
+    truth = {
+        "SIMULATED": "SIMULATED: this is the ground truth of a simulated study",
+        "seed": seed,
+        "score": true_slopes(PEOPLE),
+        "people": asdict(PEOPLE),
+        "calibration_sd": CALIBRATION,
+        "spoilt": {code: asdict(fault) for code, fault in faults.items()},
+        "strokes": [row for rows in strokes for row in rows],
+    }
+    write_json(parent / GROUND_TRUTH_FILE, truth)
 
 
 def true_slopes(people: SubjectSettings) -> dict[str, Any]:
@@ -312,8 +313,7 @@ def seds_of_fingers(
     times = np.exp(moisture * _FINGERS) if moisture else np.ones(1)
     loads = [
         (surface.mu * factor, surface.tau_max * factor, block.indentation, surface.direction, surface.speed)
-        for factor in times.tolist()
-        for surface in surfaces
+        for factor, surface in product(times.tolist(), surfaces)
     ]
     answers = [sed for sed in seds(loads) if sed is not None]
     if len(answers) < len(loads):

@@ -14,7 +14,7 @@ from sessions.recording import Recording
 from sessions.recording.replay import ReplayTransducer
 from sessions.run import steps
 from sessions.toml_file import load_toml
-from simulators.bench import Bench, StrokeGroundTruth
+from simulators.bench import Bench
 from simulators.net_ft_box import NetFtBox
 from simulators.serving import WIRES as WIRES  # the verb serves them
 from simulators.serving import Script, Timetable, TimetableError, timetable_in
@@ -115,14 +115,6 @@ class SimulatedHand:
         self.subject, self.surface = subject, surface
         self.connected = bench
         self.stroke_trials: list[Trial] = []  # in order, once per take
-
-    @property
-    def strokes(self) -> dict[int, StrokeGroundTruth]:
-        """Return the ground truth of the last stroke of each trial, by its number."""
-        assert self.connected is not None
-        assert self.connected.bench is not None
-        ground_truth = self.connected.bench.ground_truth()
-        return {trial.number: stroke for trial, stroke in zip(self.stroke_trials, ground_truth, strict=True)}
 
     def show(self, command: steps.Command) -> None:
         """Carry out the part of a command that concerns a hand."""

@@ -164,11 +164,8 @@ class SessionState:
 
 def begin_session(message: m.SessionBegun, now: float) -> SessionState:
     """Return the state of a session that begins, or is resumed, at `now` [s]."""
-    trials = tuple(
-        TrialState(trial, has_stimulus=trial.standard or not block.candidates)
-        for block in message.plan.blocks
-        for trial in block.trials
-    )
+    pairs = ((block, trial) for block in message.plan.blocks for trial in block.trials)
+    trials = tuple(TrialState(trial, has_stimulus=trial.standard or not block.candidates) for block, trial in pairs)
     start = (message.events[0].time_ns - message.clock_offset_ns) * 1e-9 if message.events else now
     session = SessionState(message.folder, message.plan, message.people, message.simulated, trials, start, since=now)
     for event in message.events:

@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import structs
 
 from daq_app.recorder.messages import Live, Report
-from daq_app.window.live_trace import CHANNELS, LiveTrace, with_gaps
+from daq_app.window.live_trace import LiveTrace, with_gaps
 from daq_app.wording import tr_noop
 from drivers.arrays import Array, Indices, Mask
 from drivers.calibration import LIMITS, WARNING
@@ -117,7 +117,7 @@ class LiveFeed:
         return ReadingBlock(sequence, sequence, take.status, take.time, take.received_ns, raw=wrench)
 
     def _channels(self, live: Live, frame: Frame) -> Array:
-        """Return the plotted channels (channels, n); nan for a meaningless value."""
+        """Return the plotted `CHANNELS` (channels, n); nan for a meaningless value."""
         wrench = in_face_frame(live.wrench, frame)
         normal = -wrench[:, 2]
         tangential = np.hypot(wrench[:, 0], wrench[:, 1])
@@ -126,10 +126,7 @@ class LiveFeed:
             ratio = np.where(pressed, tangential / normal, np.nan)
         position = np.where(pressed[:, None], centre_of_pressure(wrench, frame.height), np.nan)
         self._tail, speed = self._tail.advance(live.time, position)
-        values = np.empty((len(CHANNELS), len(normal)))
-        values[:6] = wrench.T
-        values[6], values[7], values[8], values[9] = normal, tangential, ratio, speed
-        values[10:] = position.T
+        values = np.vstack([wrench.T, normal, tangential, ratio, speed, position.T])
         return np.where(live.status == 0, values, np.nan)
 
 

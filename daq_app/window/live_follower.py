@@ -50,11 +50,9 @@ def settled_scene(
     if friction.mu is None or friction.direction is None or normal_force <= 0.0:
         return None
     speed = friction.speed or DEFAULT_SPEED
-    return replace(
-        live_scene(plan, kinematics),
-        friction=Friction(max(friction.mu, 0.0), friction.tau_max),
-        loading=Loading(slide=SLIDES[friction.direction], speed=speed, normal_force=normal_force, force_unit="N"),
-    )
+    loading = Loading(slide=SLIDES[friction.direction], speed=speed, normal_force=normal_force, force_unit="N")
+    law = Friction(max(friction.mu, 0.0), friction.tau_max)
+    return replace(live_scene(plan, kinematics), friction=law, loading=loading)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

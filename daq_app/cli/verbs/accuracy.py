@@ -46,8 +46,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         for page, text in _docs(options, page_tables).items():
             page.write_text(text, encoding="utf-8")
     if "targets" in page_tables:
-        rows = [[cell for n, cell in enumerate(row) if n != 7] for row in page_tables["targets"].rows]
-        console.say(table(rows, header=list(page_tables["targets"].header[:7])))
+        header, *rows = ([*line[:7]] for line in (page_tables["targets"].header, *page_tables["targets"].rows))
+        console.say(table(rows, header=header))
     console.say(*(page_tables[name].caption for name in ("hard-small", "hard-finite") if name in page_tables))
     console.note(*(f"note: {sentence}" for sentence in results.left_out))
     console.say(f"{options.out / PAGE}")

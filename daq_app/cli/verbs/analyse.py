@@ -58,10 +58,7 @@ def _print(recording: Recording, analysis: Analysis, console: Console) -> None:
 
 
 def _tilt_text(tilt: Tilt, angles: tuple[float, float]) -> str:
-    intervals = (tilt.x_interval, tilt.y_interval)
-    rows = [
-        f"{number(angle)}° ({number(low)} to {number(high)}) to +{axis}"
-        for axis, angle, (low, high) in zip("xy", tilt.lean, intervals, strict=True)
-    ]
+    axes = zip("xy", tilt.lean, (tilt.x_interval, tilt.y_interval), strict=True)
+    rows = [f"{number(angle)}° ({number(low)} to {number(high)}) to +{axis}" for axis, angle, (low, high) in axes]
     levelling = f"levelled by {angles[0]:g}° and {angles[1]:g}°" if angles != (0.0, 0.0) else "not levelled"
     return f"tilt of the face, if the hand pressed straight down: {', '.join(rows)}; {tilt.kind}; {levelling}"

@@ -88,21 +88,15 @@ def _rows(
     """Return a row for each trial: ground truth, estimates, prediction and score."""
     truths = {truth.trial: truth for truth in study.ground_truth}
     speeds = {friction.trial: friction.speed for friction in analysis.friction}
-    rows = [
-        {
-            "descriptor": row.stimulus.descriptor,
-            "index": row.stimulus.index,
-            **{f"planted_{name}": getattr(truths[row.trial], name) for name in ("mu", "tau_max", "speed")},
-            "mu": row.mu,
-            "tau_max": row.tau_max,
-            "speed": speeds.get(row.trial),
-            "sed": row.sed,
-            "error_estimate": row.error_estimate,
-            "mean_score": means.get((row.stimulus.descriptor, row.stimulus.known_index)),
-        }
-        for row in prediction.trials
-        if row.stimulus is not None and row.trial is not None
-    ]
+    rows: list[dict[str, Any]] = []
+    for row in prediction.trials:
+        if (stimulus := row.stimulus) is not None and row.trial is not None:
+            truth = {f"planted_{name}": getattr(truths[row.trial], name) for name in ("mu", "tau_max", "speed")}
+            estimates = {"mu": row.mu, "tau_max": row.tau_max, "speed": speeds.get(row.trial)}
+            answer = {"sed": row.sed, "error_estimate": row.error_estimate}
+            score = {"mean_score": means.get((stimulus.descriptor, stimulus.known_index))}
+            labels = {"descriptor": stimulus.descriptor, "index": stimulus.index}
+            rows.append(labels | truth | estimates | answer | score)
     return sorted(rows, key=lambda row: (row["descriptor"] != "stickiness", row["index"]))
 
 

@@ -65,11 +65,7 @@ def _description(device: Probe) -> dict[str, Any]:
     if device.info is None:
         return {"uri": device.uri, "problem": device.problem}
     life = life_of(device.info.serial)
-    return {
-        **identity(device.info),
-        "calibration": device.info.calibration.source,
-        "life": None if life is None else asdict(life),
-    }
+    return {**identity(device.info), "calibration": device.info.calibration.source, "life": life and asdict(life)}
 
 
 def _life_text(life: Life) -> str:
@@ -77,10 +73,8 @@ def _life_text(life: Life) -> str:
     if not life.zeros:
         return f"{overloads} since its first use here"
     drift, noise = max(map(abs, life.drift[:3])), max(life.noise[:3])
-    return (
-        f"zero moved by at most {number(drift, 2)} N since {life.since} ({life.zeros} zeros), "
-        f"noise at rest {number(noise, 2)} N, {overloads}"
-    )
+    zeros = f"zero moved by at most {number(drift, 2)} N since {life.since} ({life.zeros} zeros)"
+    return f"{zeros}, noise at rest {number(noise, 2)} N, {overloads}"
 
 
 def _probe(uri: str, console: Console) -> int:
@@ -90,15 +84,16 @@ def _probe(uri: str, console: Console) -> int:
         readings = _listen(transducer, clock, console)
         health, info = transducer.health, transducer.info
     wrench = info.calibration.wrench(readings.raw, np.zeros(6))
-    mean, noise = (wrench.mean(axis=0), wrench.std(axis=0, ddof=1)) if len(readings) > 1 else (None, None)
+    mean: list[float] | None = wrench.mean(axis=0).tolist() if len(readings) > 1 else None
+    noise: list[float] | None = wrench.std(axis=0, ddof=1).tolist() if len(readings) > 1 else None
     units = ["N"] * 3 + ["N mm"] * 3
     console.result(
         **identity(info) | {"uri": uri},
         measured_rate=_measured_rate(readings),
         settings=dict(info.settings),
         health=asdict(health),
-        mean=None if mean is None else mean.tolist(),
-        noise=None if noise is None else noise.tolist(),
+        mean=mean,
+        noise=noise,
         units=units,
     )
     counts = ", ".join(f"{label} {getattr(health, name)}" for name, label in COUNT_LABELS.items())
@@ -111,7 +106,7 @@ def _probe(uri: str, console: Console) -> int:
         health.rate_words or None,
     )
     if mean is not None and noise is not None:
-        columns = zip(AXES, mean.tolist(), noise.tolist(), units, strict=True)
+        columns = zip(AXES, mean, noise, units, strict=True)
         rows = [[axis, number(mean_value), number(sd, 2), unit] for axis, mean_value, sd, unit in columns]
         console.say(table(rows, header=["axis", "mean", "noise (sd)", "unit"]))
     return FLAWED if any(getattr(health, name) for name in _FLAWS) or not len(readings) else DONE

@@ -138,9 +138,8 @@ def _fit(
     deepest = max(float(press.displacement.max() - press.touch) for press in curves.presses)  # [mm]
     model = press_model(finger, float(np.log(options.prior)), DEEPER * deepest, options.mu, progress)
     if options.relaxation:
-        finger_fit, rate = relaxing_fit(
-            model, [press for press, _ in holds], [hold for _, hold in holds], gain_error, options.seed
-        )
+        presses, hold_curves = [press for press, _ in holds], [hold for _, hold in holds]
+        finger_fit, rate = relaxing_fit(model, presses, hold_curves, gain_error, options.seed)
     else:
         finger_fit, rate = fit(model, curves.presses, gain_error, options.seed), None
     solver_check = check(model, np.array([layer.stiffness.value for layer in finger_fit.layers]), finger_fit.deepest)
@@ -149,15 +148,10 @@ def _fit(
 
 def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> None:
     finger_fit, solver_check = outcome.fit, outcome.check
-    rows = [
-        [
-            layer.name,
-            number(layer.stiffness.value, factor=1e3),
-            *map(_interval_text, (layer.stiffness, layer.profile, layer.prior)),
-            f"{100 * share:.0f} %",
-        ]
-        for layer, share in zip(finger_fit.layers, solver_check.shares, strict=True)
-    ]
+    rows: list[list[str]] = []
+    for layer, share in zip(finger_fit.layers, solver_check.shares, strict=True):
+        intervals = map(_interval_text, (layer.stiffness, layer.profile, layer.prior))
+        rows.append([layer.name, number(layer.stiffness.value, factor=1e3), *intervals, f"{100 * share:.0f} %"])
     console.say(table(rows, header=["E [kPa]", "fit", "95 % interval", "by likelihood alone", "prior", "share of N"]))
     overall, (low, high) = finger_fit.overall, (finger_fit.overall.low or 0.0, finger_fit.overall.high or 0.0)
     console.say(

@@ -56,14 +56,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     _refuse_mixtures(options, simulated_bench=options.device is not None and options.device.startswith("sim:"))
     session_protocol, seed, body, study_place = _choices(options)
+    hands = options.stroking_hand, options.answering_hand
     session_plan = plan(
         session_protocol,
         options.subject,
         seed,
         forces=options.device is not None,
-        setting=VisitSetting(
-            None, options.contact_area, options.stroking_hand, options.answering_hand, options.language
-        ),
+        setting=VisitSetting(None, options.contact_area, *hands, options.language),
         phases=options.phases,
         body=body,
         place=study_place,
@@ -71,9 +70,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     folder = options.out or (options.study or Path("recordings")) / session_plan.folder_name(datetime.now())
     console.note(measures_sentence(session_plan))
     simulated = options.simulate_subject
-    people = (
-        People() if simulated is None else People("simulated people", simulated, session_protocol.simulated_friction)
-    )
+    surfaces = session_protocol.simulated_friction
+    people = People() if simulated is None else People("simulated people", simulated, surfaces)
     settings = (Setting("seed", seed, "", "default" if options.seed is None else "set"),)
     with Recorder.start(options.pace, debug=options.debug) as recorder:
         bench = open_device(recorder, options.device) if options.device else None

@@ -89,7 +89,7 @@ def selftest(room: Path, progress: Progress) -> dict[str, Any]:
     progress(0.75, "stopping sessions")
     stop_ms = _try_stops(room / "stopped")
     progress(0.85, "cutting the ends off logs")
-    cuts = _try_cuts(logs, room / "cut", chance)
+    _try_cuts(logs, room / "cut", chance)
     progress(0.9, "filling the disk space of a session")
     quota = _try_quota(room / "full")
     return {
@@ -97,13 +97,13 @@ def selftest(room: Path, progress: Progress) -> dict[str, Any]:
         "utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "sentence": (
             f"On this computer and disk the recorder was killed {KILLS} times, the end of its log was cut off "
-            f"{cuts} times and its disk space was filled: everything acknowledged was there afterwards "
+            f"{CUTS} times and its disk space was filled: everything acknowledged was there afterwards "
             f"({kills['readings'] + quota['readings']} readings, {kills['events']} events), at most "
             f"{kills['most_lost']:.2f} s of the rest was lost, and each session resumed at the same trial. "
             f"A stop took {stop_ms:.0f} ms."
         ),
         "kills": kills,
-        "cuts": cuts,
+        "cuts": CUTS,
         "quota": quota,
         "stop_ms": stop_ms,
         "disk": {"file_system": file_system(room)},
@@ -234,8 +234,8 @@ def _try_stops(room: Path) -> float:
     return round(float(np.median(spans)) * 1e3, 1)
 
 
-def _try_cuts(copies: list[Path], folder: Path, chance: random.Random) -> int:
-    """Cut the ends off copies of a log, as a power cut may; return the number of cuts. Raises SelfTestFailed."""
+def _try_cuts(copies: list[Path], folder: Path, chance: random.Random) -> None:
+    """Cut the ends off copies of a log, as a power cut may. Raises SelfTestFailed."""
     for number in range(CUTS):
         shutil.copytree(copies[number % len(copies)], folder)
         log = folder / f"{LIVE_FILE}-wal"
@@ -252,7 +252,6 @@ def _try_cuts(copies: list[Path], folder: Path, chance: random.Random) -> int:
             if (np.diff(sequence) != 1).any():
                 raise SelfTestFailed("a log whose end was cut off gave readings with a gap inside")
         shutil.rmtree(folder)
-    return CUTS
 
 
 class _QuotaWriter(SessionWriter):

@@ -216,22 +216,15 @@ def _mark(answer: Answer | str, position: int, column: int) -> str:
 
 def _print_thirds(name: str, points: Array, signs: Array, label: str, console: Console) -> None:
     """Print the share of fingers that keep the signs in each third of the most influential number."""
-    rows = [
-        f"{100 * kept_share:.0f} % at {number(low)} to {number(high)}"
-        for low, high, kept_share in sign_map.shares_by_thirds(signs, points[:, list(sign_map.DESIGN).index(name)])
-        if kept_share is not None
-    ]
-    console.say(f"The {label} keeps both signs, by {name}: {', '.join(rows)}.")
+    thirds = sign_map.shares_by_thirds(signs, points[:, list(sign_map.DESIGN).index(name)])
+    texts = (f"{100 * part:.0f} % at {number(low)} to {number(high)}" for low, high, part in thirds if part is not None)
+    console.say(f"The {label} keeps both signs, by {name}: {', '.join(texts)}.")
 
 
 def _index_table(indices: Sequence[Index]) -> str:
-    rows = [
-        [
-            index.name,
-            f"{number(index.low)} to {number(index.high)}",
-            f"{digits(index.first, 2)} ± {index.first_error:.2f}",
-            f"{digits(index.total, 2)} ± {index.total_error:.2f}",
-        ]
-        for index in indices
-    ]
+    rows: list[list[str]] = []
+    for index in indices:
+        pairs = (index.first, index.first_error), (index.total, index.total_error)
+        shares = (f"{digits(share, 2)} ± {error:.2f}" for share, error in pairs)
+        rows.append([index.name, f"{number(index.low)} to {number(index.high)}", *shares])
     return table(rows, header=["number", "varied", "alone", "with others"])

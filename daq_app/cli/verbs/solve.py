@@ -129,15 +129,14 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
         lines = [[number(arc, 4), *line] for arc, line in zip(ROW.tolist(), cells, strict=True)]
         console.say(table(lines, header=["arc [mm]", *(response.label for response in QUANTITIES)]).lstrip("\n"))
     effects = [[name, _percent(entry["estimate"])] for name, entry in prediction.model["left_out"].items()]
+    values = prediction.audits
+    audits = [[label, number(values[name] + 0.0, 2)] for name, label in AUDITS.items() if name in values]
     console.say(
-        "\nEffects left out of the model, and how much each is estimated to change the SED (--json explains how):"
+        "\nEffects left out of the model, and how much each is estimated to change the SED (--json explains how):",
+        table(effects, header=["", ""]).lstrip("\n"),
+        "\nChecks of the solution (0 is perfect; a volume of 1 is unchanged):",
+        table(audits, header=["", ""]).lstrip("\n"),
     )
-    console.say(table(effects, header=["", ""]).lstrip("\n"))
-    console.say("\nChecks of the solution (0 is perfect; a volume of 1 is unchanged):")
-    audits = [
-        [label, number(prediction.audits[name] + 0.0, 2)] for name, label in AUDITS.items() if name in prediction.audits
-    ]
-    console.say(table(audits, header=["", ""]).lstrip("\n"))
     console.note(*(f"note: {warning}" for warning in prediction.warnings))
 
 

@@ -114,9 +114,9 @@ class Sheet:
         self.hover[gid] = text
         return gid
 
-    def panel(self, name: str, title: str, header: tuple[str, ...], rows: Iterable[tuple[Cell, ...]]) -> Panel:
-        """Return the finished picture with its numbers; call inside `look`."""
-        return Panel(name, title, svg(self, name, title), header, tuple(rows))
+    def panel(self, name: str, title: str, header: Sequence[str] = (), rows: Iterable[tuple[Cell, ...]] = ()) -> Panel:
+        """Return the finished picture with its numbers, if it has any; call inside `look`."""
+        return Panel(name, title, svg(self, name, title), tuple(header), tuple(rows))
 
 
 @contextmanager

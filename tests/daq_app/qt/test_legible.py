@@ -293,7 +293,7 @@ def test_no_text_of_review_and_about_is_cut_off(application, type_size, size, sc
     window.show()
     window.take(m.ReportReady("predicted", example()))
     window.take(m.FingerHistory(selected_row(window.state).key, film()))
-    window.take(m.OtherSession("other", example()))
+    window.take(m.OtherSession(example()))
     about = about_box(window)
     about.show()
     for column in range(3):

@@ -302,7 +302,7 @@ def test_readings_are_replayed_with_play_pause_speed_seek_and_step(window):
 
 
 def test_a_second_session_is_shown_beside_the_first(window):
-    window.take(m.OtherSession("other", example()))
+    window.take(m.OtherSession(example()))
     table = window.model.comparison.table
     assert len(texts(table)) == len({(p.experiment, p.index) for p in window.state.report.predictions})
     assert {line[3] for line in texts(table)} == {"+0.000"}
@@ -311,7 +311,7 @@ def test_a_second_session_is_shown_beside_the_first(window):
 
 def test_the_comparison_follows_a_decision_that_changes_the_first_session(window):
     report = example()
-    window.take(m.OtherSession("other", report))
+    window.take(m.OtherSession(report))
     count = window._work.requests.count(m.Draw("compared"))
     predictions = tuple(replace(prediction, mu=prediction.mu + 0.1) for prediction in report.predictions)
     window.take(m.ReportReady("predicted", replace(report, predictions=predictions)))

@@ -295,7 +295,7 @@ def two_fingers(application, window, factor=1.5):
     row = selected_row(window.state)
     window.take(m.TrialAnswer(row.prediction, frame(0.002)))
     other = frame(0.002 * factor)
-    window.take(m.OtherSession("other", replace(example(), session="later"), {row.key: other}))
+    window.take(m.OtherSession(replace(example(), session="later"), {row.key: other}))
     window.model.tabs.setCurrentIndex(0)
     application.processEvents()
     return window.model.finger, window.model.compared_finger
@@ -342,7 +342,7 @@ def test_a_stimulus_that_the_compared_session_lacks_has_a_sentence_in_place_of_a
     window.take(m.TrialAnswer(row.prediction, frame(0.002)))
     stimulus = row.prediction.experiment, row.prediction.index
     remaining = tuple(p for p in example().predictions if (p.experiment, p.index) != stimulus)
-    window.take(m.OtherSession("other", replace(example(), session="later", predictions=remaining)))
+    window.take(m.OtherSession(replace(example(), session="later", predictions=remaining)))
     window.model.tabs.setCurrentIndex(0)
     application.processEvents()
     assert window.model.compared_finger.accessibleName() == "B  later has no answer to this stimulus."
