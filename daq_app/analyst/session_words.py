@@ -27,8 +27,6 @@ _DIRECTIONS = {1: tr_noop("distal"), -1: tr_noop("proximal")}
 class Point:
     """A stimulus in the plot of prediction against score."""
 
-    experiment: str
-    index: int
     score: float
     response: float  # the quantity compared with the scores, in the unit shown
     row: int  # selected by a click on it
@@ -195,12 +193,11 @@ def points(state: AnalystState) -> tuple[Point, ...]:
     points: list[Point] = []
     for number, row in enumerate(rows(state)):
         prediction = row.prediction
-        response = None if prediction is None else response_kind.numbers(prediction)
-        if prediction is None or prediction.index is None or not response:
+        if prediction is None or prediction.index is None:
             continue
-        stimulus = prediction.experiment, prediction.index
-        if stimulus in scores:
-            points.append(Point(*stimulus, scores[stimulus], response_kind.factor * response[0], number))
+        score, response = scores.get((prediction.experiment, prediction.index)), response_kind.numbers(prediction)
+        if score is not None and response:
+            points.append(Point(score, response_kind.factor * response[0], number))
     return tuple(points)
 
 
