@@ -255,10 +255,19 @@ def is_current(document: Mapping[str, Any], decisions: Decisions) -> bool:
     return document.get("decisions", []) == now
 
 
-def decisions_of(document: Mapping[str, Any]) -> Decisions:
-    """Return the decisions that a stored document was made with. Raises SettingsError if they are damaged."""
+def stale_sentence(name: str, document: Mapping[str, Any], decisions: Decisions) -> str | None:
+    """Return a sentence if a stored document was made with other decisions than those in force now, else None."""
+    sentence = f"{name} was made under other decisions than those in force: compute it again"
+    return None if is_current(document, decisions) else sentence
+
+
+def decisions_of(document: Mapping[str, Any], now: Decisions) -> Decisions:
+    """Return the decisions that a stored document was made with, and the problems of those `now`.
+
+    Raises SettingsError if they are damaged.
+    """
     try:
-        return Decisions(as_type(document.get("decisions", []), tuple[Decision, ...]))
+        return Decisions(as_type(document.get("decisions", []), tuple[Decision, ...]), now.problems)
     except ValueError as error:
         raise SettingsError(f"the decisions stored with it are damaged: {error}") from error
 

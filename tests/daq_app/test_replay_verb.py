@@ -49,6 +49,19 @@ def test_an_analysis_that_names_a_damaged_decision_comes_out_the_same_again(sess
     assert run(["replay", str(session), "--fast", "--json"]) == 0
 
 
+def test_results_from_before_a_decision_are_compared_with_those_of_their_time(session_folder, tmp_path, capsys):
+    session = shutil.copytree(session_folder, tmp_path / "P07")
+    earlier = (session / "analysis.json").read_bytes()
+    decision = ["--trial", "1", "--drop", "--by", "E02", "--why", "the finger rolled"]
+    assert run(["decide", str(session), *decision, "--json"]) == 0
+    (session / "analysis.json").write_bytes(earlier)
+    capsys.readouterr()
+    assert run(["replay", str(session), "--fast", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["differences"] == []
+    assert document["notes"] == ["analysis.json was made under other decisions than those in force: compute it again"]
+
+
 def test_a_replay_leaves_the_session_as_it_was(session_folder):
     before = {path.name: path.read_bytes() for path in session_folder.iterdir()}
     assert run(["replay", str(session_folder), "--speed", "500", "--json"]) == 0

@@ -9,10 +9,19 @@ import argparse
 import json
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
-from daq_app.batch.derived import ANALYSIS, PREDICTION, changes, repeat, stored_document
+from daq_app.batch.derived import (
+    ANALYSIS,
+    PREDICTION,
+    changes,
+    decisions_of,
+    repeat,
+    stale_sentence,
+    stored_document,
+)
 from daq_app.cli.options import add_session, number_in_range
 from daq_app.console import DONE, FLAWED, Console
 from sessions.recording import Recording
@@ -44,18 +53,26 @@ def run(options: argparse.Namespace, console: Console) -> int:
         differences = [*different_readings(recording, copy), *first_sentences(list(different_events(recording, copy)))]
         items = ["readings", "events", ANALYSIS]
         decisions = read(recording.folder)  # decisions belong to the recording, not to its replay
+        notes = list(_notes(recording))
+
+        def compare(name: str, document: Mapping[str, Any]) -> list[str]:
+            """Return the differences of a document made again with its own decisions; note it if others apply now."""
+            notes.extend(filter(None, [stale_sentence(name, document, decisions)]))
+            fresh = repeat(name, document, copy, decisions_of(document, decisions), recording)
+            return changes(name, document, fresh)
+
         analysis = stored_document(options.session, ANALYSIS)
         if analysis is None:
             analysis = json.loads(json.dumps(repeat(ANALYSIS, {}, recording, decisions)))
-        differences += changes(ANALYSIS, analysis, repeat(ANALYSIS, analysis, copy, decisions))
+        differences += compare(ANALYSIS, analysis)
         prediction = None if options.no_prediction else stored_document(options.session, PREDICTION)
         if prediction is not None:
             console.progress(0.9, f"making {PREDICTION} again")
-            differences += changes(PREDICTION, prediction, repeat(PREDICTION, prediction, copy, decisions, recording))
+            differences += compare(PREDICTION, prediction)
             items.append(PREDICTION)
     events = recording.events
     duration_s = (events[-1].time_ns - events[0].time_ns) * 1e-9 if events else 0.0
-    notes, times = list(_notes(recording)), {"duration_s": duration_s, "wall_s": wall_s}
+    times = {"duration_s": duration_s, "wall_s": wall_s}
     console.result(session=str(options.session), compared=items, differences=differences, notes=notes, **times)
     outcome = "identical" if not differences else "not identical, as named above"
     console.say(

@@ -4,10 +4,9 @@ Exit code 0: whole; 3: readable, with losses or differences named; 1: unreadable
 """
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 
-from daq_app.batch.derived import ANALYSIS, PREDICTION, changes, decisions_of, is_current, repeat, stored_document
+from daq_app.batch.derived import ANALYSIS, PREDICTION, changes, decisions_of, repeat, stale_sentence, stored_document
 from daq_app.cli.options import add_session
 from daq_app.console import DONE, FLAWED, Console
 from sessions.recording import Recording, RecordingError
@@ -43,10 +42,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
             document = stored_document(folder, name)
             if document is None:
                 continue
-            if not is_current(document, decisions):
-                flaws.append(f"{name} was made under other decisions than those in force: compute it again")
-            made_with = replace(decisions_of(document), problems=decisions.problems)
-            fresh = repeat(name, document, recording, made_with)
+            stale = stale_sentence(name, document, decisions)
+            flaws += [] if stale is None else [stale]
+            fresh = repeat(name, document, recording, decisions_of(document, decisions))
         except (RecordingError, SettingsError) as damaged:
             flaws.append(" ".join(str(damaged).split()))
             continue
