@@ -13,7 +13,7 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Frame
 from sessions.run.steps import ContactOnset, FingerLifted, Settled, Zeroed
-from sessions.strokes.contacts import ContactDetector, Onset, is_quiet
+from sessions.strokes.contacts import ContactDetector, is_quiet
 from sessions.strokes.forces import normal_force
 from sessions.strokes.settings import DetectorSettings
 
@@ -75,13 +75,9 @@ class TakeWatch:
 
     def _touches(self, detector: ContactDetector, block: ReadingBlock) -> tuple[Noticed, ...]:
         notices: list[Noticed] = []
-        for event in detector.feed(block.time, self._normal_force(block)):
-            if isinstance(event, Onset):
-                notices.append(ContactOnset(event.time, event.noticed))
-                self._lifted = None
-            else:
-                notices.append(FingerLifted(event.time, event.noticed))
-                self._lifted = event.time
+        for touches, time, noticed in detector.feed(block.time, self._normal_force(block)):
+            notices.append((ContactOnset if touches else FingerLifted)(time, noticed))
+            self._lifted = None if touches else time
         last_time = float(block.time[-1])
         if self._lifted is not None and last_time - self._lifted >= self.after_lift:
             notices.append(Settled(last_time))

@@ -26,20 +26,12 @@ class Baseline(NamedTuple):
     noise: float  # standard deviation about it [N]
 
 
-@dataclass(frozen=True, slots=True)
-class ContactEvent:
+class ContactEvent(NamedTuple):
     """The finger has touched or left."""
 
+    touches: bool
     time: float  # at which the force left the noise, or first fell below the lift threshold [s, device time]
     noticed: float  # reading at which this was certain [s, device time]
-
-
-class Onset(ContactEvent):
-    """The finger has touched."""
-
-
-class Lift(ContactEvent):
-    """The finger has left."""
 
 
 class ContactDetector:
@@ -91,7 +83,7 @@ class ContactDetector:
         """Return the onset once the force has exceeded the threshold for long enough."""
         if t - began < self._settings.onset_hold - _ROUNDING:
             return None
-        onset = Onset(began if self._noise_exit is None else self._noise_exit, t)
+        onset = ContactEvent(touches=True, time=began if self._noise_exit is None else self._noise_exit, noticed=t)
         self._touching = True
         self._above = self._noise_exit = None
         return onset
@@ -100,7 +92,7 @@ class ContactDetector:
         self._below = _since(self._below, t, holds=force - self._level < self._lift)
         if self._below is None or t - self._below < self._settings.lift_hold - _ROUNDING:
             return None
-        lift = Lift(self._below, t)
+        lift = ContactEvent(touches=False, time=self._below, noticed=t)
         self._touching = False
         self._below = None
         self._start_gathering()
@@ -228,10 +220,10 @@ def find_contacts(time: Array, normal: Array, baseline: Baseline, settings: Anal
     if not len(time):
         return ()
     events = ContactDetector(settings.detector, baseline).feed(time, normal)
-    onsets = [event.time for event in events if isinstance(event, Onset)]
-    lifts: list[float | None] = [event.time for event in events if isinstance(event, Lift)]
+    onsets = [event.time for event in events if event.touches]
+    lifts = [event.time for event in events if not event.touches]
     pieces: list[Contact] = []
-    for onset, lift in zip(onsets, lifts + [None] * (len(onsets) - len(lifts)), strict=True):
+    for onset, lift in zip(onsets, [*lifts, None], strict=False):  # the last may have no lift
         start = int(np.searchsorted(time, onset))
         stop = len(time) if lift is None else int(np.searchsorted(time, lift))
         pieces.append(Contact(start, stop, None if start == 0 else onset, lift))

@@ -234,17 +234,10 @@ def break_away_draws(
     return np.concatenate(draws)
 
 
-class StickSlip(NamedTuple):
-    """Stick-slip of a contact."""
+def stick_slip(time: Array, ratio: Array, noise: float, settings: AnalysisSettings) -> tuple[float, float] | None:
+    """Return the frequency of slips [Hz] in unfiltered T/N (n,) [-] at `time` (n,) [s]; None without stick-slip.
 
-    frequency: float  # of the slips [Hz]
-    crest_gap: float  # climb of T/N between readings: they may miss a crest by it [-]
-
-
-def stick_slip(time: Array, ratio: Array, noise: float, settings: AnalysisSettings) -> StickSlip | None:
-    """Return the stick-slip in unfiltered T/N (n,) [-] at `time` (n,) [s]; None without one.
-
-    `noise` is the standard deviation of T/N [-].
+    Also the climb of T/N between readings [-]: they may miss a crest by it. `noise` is T/N's standard deviation [-].
     """
     limits = settings.ratio
     step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
@@ -261,7 +254,7 @@ def stick_slip(time: Array, ratio: Array, noise: float, settings: AnalysisSettin
         return None
     steps = np.diff(ratio)
     climb = float(np.nanmedian(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
-    return StickSlip(float((len(drops) - 1) / (time[drops[-1]] - time[drops[0]])), climb)
+    return float((len(drops) - 1) / (time[drops[-1]] - time[drops[0]])), climb
 
 
 def _beginnings(mask: Mask) -> NDArray[np.intp]:
