@@ -5,7 +5,6 @@ All scenes of a session are solved together on one mesh, so that differences are
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 from sessions.plan.plan import DISTAL_TO_PROXIMAL, PROXIMAL_TO_DISTAL, Block, SessionPlan, Trial
 from sessions.prediction.options import PredictionOptions, bound, template, with_own_finger
@@ -25,11 +24,8 @@ CONTRAST = 0.05  # error of differences between surfaces, relative to their rang
 DEFAULT_SPEED = 20.0  # where none was measured [mm/s]; rescales only the time of a course
 
 
-class ModelInput(NamedTuple):
-    """The row and the scene of one trial or stroke, before it is solved."""
-
-    row: TrialPrediction  # as known before solving
-    scene: Scene | None  # None without a scene to solve
+# The row of one trial or stroke as known before it is solved, and its scene; None without one to solve
+ModelInput = tuple[TrialPrediction, Scene | None]
 
 
 def scenes_of(analysis: Analysis, plan: SessionPlan, options: PredictionOptions) -> Mapping[int, Scene]:
@@ -87,8 +83,8 @@ def _model_input(
     reason = _missing_reason(row, stroke)
     if reason is not None:
         names = ("sed", "normal_force", "tangential_force", "matching_depth", "opposite_sed")
-        return ModelInput(replace(row, reasons=dict.fromkeys(names, reason)), None)
-    return ModelInput(row, _scene(row, options))
+        return replace(row, reasons=dict.fromkeys(names, reason)), None
+    return row, _scene(row, options)
 
 
 def _missing_reason(row: TrialPrediction, stroke: Stroke | None) -> str | None:

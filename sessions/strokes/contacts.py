@@ -19,13 +19,6 @@ from sessions.strokes.settings import AnalysisSettings, BootstrapSettings, Detec
 NORMAL_STEP = 1.4826 / sqrt(2)  # standard deviation of white noise over its median absolute step between neighbours
 
 
-class Baseline(NamedTuple):
-    """The normal force with nothing touching."""
-
-    level: float  # mean [N]
-    noise: float  # standard deviation about it [N]
-
-
 class ContactEvent(NamedTuple):
     """The finger has touched or left."""
 
@@ -41,10 +34,10 @@ class ContactDetector:
     without such a stretch nothing is detected. A force well below its zero renews this measurement.
     """
 
-    def __init__(self, settings: DetectorSettings | None = None, baseline: Baseline | None = None) -> None:
-        """Start without a baseline, or with one measured elsewhere, which then stays fixed."""
+    def __init__(self, settings: DetectorSettings | None = None, noise: float | None = None) -> None:
+        """Start without a zero, or with the `noise` [N] of a force that is zeroed already, which then stays fixed."""
         self._settings = settings or DetectorSettings()
-        self._follows = baseline is None
+        self._follows = noise is None
         # Finished bins; the newest may hold the first part of a touch.
         self._bins: deque[list[float]] = deque(maxlen=self._settings.baseline_parts + 1)
         self._bin: list[float] = []
@@ -56,8 +49,8 @@ class ContactDetector:
         self._pull_start: float | None = None  # first reading of the present run far below zero
         self._has_zero = False  # zero and noise were measured
         self._level = self._noise_band = self._threshold = self._lift = 0.0
-        if baseline is not None:
-            self._take(baseline)
+        if noise is not None:
+            self._take(0.0, noise)
 
     def feed(self, time: Array, normal_force: Array) -> tuple[ContactEvent, ...]:
         """Process readings, time (n,) [s] and normal force (n,) [N, pressing > 0, not zeroed]; return the events."""
@@ -119,14 +112,13 @@ class ContactDetector:
             if len(self._bins) == self._bins.maxlen:
                 stretch = [reading for values in list(self._bins)[:-1] for reading in values]
                 if is_quiet(stretch, self._settings):
-                    self._take(Baseline(fmean(stretch), _spread(stretch)))
+                    self._take(fmean(stretch), _spread(stretch))
         self._bin.append(force)
 
-    def _take(self, baseline: Baseline) -> None:
-        self._has_zero = True
-        self._level = baseline.level
-        self._noise_band = self._settings.leave_noise * baseline.noise
-        self._threshold = onset_threshold(baseline.noise, self._settings)
+    def _take(self, level: float, noise: float) -> None:
+        self._has_zero, self._level = True, level
+        self._noise_band = self._settings.leave_noise * noise
+        self._threshold = onset_threshold(noise, self._settings)
         self._lift = self._settings.lift_fraction * self._threshold
 
 
@@ -215,11 +207,11 @@ class Contact:
     uncut: "Contact | None" = None  # the contact before reversals cut it
 
 
-def find_contacts(time: Array, normal: Array, baseline: Baseline, settings: AnalysisSettings) -> tuple[Contact, ...]:
-    """Return the contacts in readings, time (n,) [s] and normal force (n,) [N, not zeroed], for a given zero."""
+def find_contacts(time: Array, normal: Array, noise: float, settings: AnalysisSettings) -> tuple[Contact, ...]:
+    """Return the contacts in readings, time (n,) [s] and zeroed normal force (n,) [N] of a `noise` [N]."""
     if not len(time):
         return ()
-    events = ContactDetector(settings.detector, baseline).feed(time, normal)
+    events = ContactDetector(settings.detector, noise).feed(time, normal)
     onsets = [event.time for event in events if event.touches]
     lifts = [event.time for event in events if not event.touches]
     pieces: list[Contact] = []

@@ -15,14 +15,7 @@ from drivers.arrays import Array, Mask
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan, Trial
-from sessions.strokes.contacts import (
-    Baseline,
-    Contact,
-    find_contacts,
-    onset_threshold,
-    split_at_reversals,
-    split_at_valleys,
-)
+from sessions.strokes.contacts import Contact, find_contacts, onset_threshold, split_at_reversals, split_at_valleys
 from sessions.strokes.decisions import Decisions, StrokeDecisions
 from sessions.strokes.settings import AnalysisSettings, Pair
 from sessions.strokes.signal_quality import signal_quality
@@ -147,7 +140,7 @@ def _pieces(span: Span, zero: StrokeZero, context: TrialContext) -> tuple[list[C
         noise = settings.contact.light_share * float(np.percentile(normal, 99.9)) / settings.detector.onset_noise
     idle = np.ones(len(span.time), np.bool_)
     pieces: list[Contact] = []
-    for contact in find_contacts(span.time, normal, Baseline(0.0, noise), settings):
+    for contact in find_contacts(span.time, normal, noise, settings):
         idle[contact.start : contact.stop] = False
         pieces += split_at_valleys(contact, span.time, smooth, settings)
     strokes: list[Contact] = []

@@ -8,7 +8,7 @@ from closed_form import times, trapezium
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sessions.strokes.contacts import Baseline, ContactDetector, onset_threshold
+from sessions.strokes.contacts import ContactDetector, onset_threshold
 from sessions.strokes.settings import DetectorSettings
 
 
@@ -103,7 +103,7 @@ def test_a_zero_taken_in_contact_is_taken_anew_once_the_finger_has_left():
 
 def test_a_baseline_given_is_used_from_the_first_reading_on():
     sticking = np.where(T < 1.0, 1.5, 0.0)
-    events = ContactDetector(baseline=Baseline(0.0, 0.004)).feed(T, noisy(sticking))
+    events = ContactDetector(noise=0.004).feed(T, noisy(sticking))
     assert [event.touches for event in events] == [True, False]
     assert events[0].time == 0.0
 
