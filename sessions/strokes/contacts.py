@@ -264,14 +264,16 @@ def _piece(contact: Contact, start: int, stop: int, time: Array, normal: Array, 
     valleys = tuple(border for border in (start, stop) if border not in (contact.start, contact.stop))
     force = np.nan_to_num(normal[start:stop])
     pressed = np.flatnonzero(force >= settings.contact.valley * force.max())
-    onset, lift = contact.onset, contact.lift
-    if start != contact.start:
-        start += int(pressed[0])
-        onset = float(time[start])
-    if stop != contact.stop:
-        stop -= len(force) - 1 - int(pressed[-1])
-        lift = float(time[stop])
-    return Contact(start, stop, onset, lift, valleys)
+    start += int(pressed[0]) if start != contact.start else 0
+    stop -= len(force) - 1 - int(pressed[-1]) if stop != contact.stop else 0
+    return replace(_part(contact, start, stop, time), valleys=valleys)
+
+
+def _part(contact: Contact, start: int, stop: int, time: Array) -> Contact:
+    """Return a part of a contact, with onset and lift at its ends where these are cuts."""
+    onset = contact.onset if start == contact.start else float(time[start])
+    lift = contact.lift if stop == contact.stop else float(time[stop])
+    return replace(contact, start=start, stop=stop, onset=onset, lift=lift)
 
 
 class _DragRun(NamedTuple):
@@ -304,17 +306,10 @@ def split_at_reversals(
     reversals = [contact.start + _reversal(stretch, run, following) for run, following in pairwise(runs)]
     if not reversals:
         return (contact,)
+    pieces = (_part(contact, *ends, time) for ends in pairwise([contact.start, *reversals, contact.stop]))
     return tuple(
-        replace(
-            contact,
-            start=start,
-            stop=stop,
-            onset=contact.onset if start == contact.start else float(time[start]),
-            lift=contact.lift if stop == contact.stop else float(time[stop]),
-            reversals=tuple(reversal for reversal in reversals if reversal in (start, stop)),
-            uncut=contact,
-        )
-        for start, stop in pairwise([contact.start, *reversals, contact.stop])
+        replace(piece, reversals=tuple(n for n in reversals if n in (piece.start, piece.stop)), uncut=contact)
+        for piece in pieces
     )
 
 
