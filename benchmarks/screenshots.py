@@ -155,7 +155,6 @@ def _settings() -> list[str]:
 
 
 def _take(setting: str, folder: Path, session: Path | None) -> None:
-    """Take the pictures of one setting."""
     from PySide6.QtCore import QLocale, QSettings
     from PySide6.QtWidgets import QApplication
 

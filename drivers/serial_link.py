@@ -13,21 +13,16 @@ from serial.tools import list_ports
 from drivers.address import Address, AddressError
 from drivers.transducer import LinkLost, SetupError
 
+try:
+    from termios import error as terminal_error  # of a port's settings
+except ImportError:  # Windows
+    terminal_error = OSError
+
 Parity = Literal["none", "even"]
-
-
-def _terminal_errors() -> tuple[type[Exception], ...]:
-    """Return the errors of port settings other than OSError; none on Windows."""
-    try:
-        import termios
-    except ImportError:
-        return ()
-    return (termios.error,)
-
 
 _PARITY = {"none": serial.PARITY_NONE, "even": serial.PARITY_EVEN}
 # Raised when a port is unplugged, or used after that. pyserial's own errors are OSErrors.
-_PORT_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, *_terminal_errors())
+_PORT_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, terminal_error)
 _POSIX = os.name == "posix"
 _MOST = 65536  # bytes taken in one call
 _WRITE_PATIENCE = 0.1  # for the system to accept bytes [real s]

@@ -305,9 +305,6 @@ class SimulatedBus(_Backend):
         buff[: len(data)] = type(buff)("B", data)
         return len(data)
 
-    def is_kernel_driver_active(self, dev_handle: SimpleNamespace, intf: int) -> bool:
-        return False
-
     def _box(self, dev_handle: SimpleNamespace) -> LabJackU6Box:
         """Return the box of a handle. Raises USBError when it was unplugged."""
         box = cast("LabJackU6Box", self._boxes[dev_handle.place])

@@ -26,8 +26,6 @@ _SHORTEST_NAP = 0.004
 
 @dataclass(slots=True)
 class _Stream:
-    """A requested stream."""
-
     to: tuple[str, int]
     tick: int  # of the next record
     number: int  # of the next record
@@ -148,7 +146,6 @@ class NetFtBox(ServedBox):
         return self._stream is not None and count < due
 
     def _receive(self) -> tuple[bytes, tuple[str, int]] | None:
-        """Return the next request and its sender, if there is one."""
         try:
             return self._sockets[0].recvfrom(2048)
         except ConnectionError:  # an earlier datagram was refused: the reader is gone
@@ -209,7 +206,6 @@ class NetFtBox(ServedBox):
         return replies, False
 
     def _answer_page(self, request: bytearray) -> tuple[bytes, bool]:
-        """Return the requested page, once the request is complete."""
         if b"\r\n\r\n" not in request:
             return b"", len(request) > 8192
         return self._inside.http_reply(bytes(request), self.now()), True

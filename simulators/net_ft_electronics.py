@@ -167,15 +167,12 @@ _REASONS = {200: "OK", 302: "Found", 404: "Not Found"}
 class Electronics:
     """The box without its ports. Times are the bench's [s]; a reading without its number has 32 bytes."""
 
-    def __init__(
-        self, bench: Bench, faults: Faults, *, rate: int, first_tick: int, rate_error: float = 0.0, product: Product
-    ) -> None:
-        """Switch on at time 0 with the counter at `first_tick`, with the rate error `rate_error` [-]."""
+    def __init__(self, bench: Bench, faults: Faults, *, rate: int, first_tick: int, product: Product) -> None:
+        """Switch on at time 0 with the counter at `first_tick`."""
         self._bench = bench
         self._faults = faults
         self._rated = np.array(bench.settings.rated)
         self.pages = Pages(bench.serial, self._rated, rate, product)
-        self._ticks_a_second = product.ticks * (1.0 + rate_error)
         self._bias = np.zeros(6)  # software bias [N, N mm]
         self._power_up = 0.0  # when the counter was `_first_tick` [s]
         self._first_tick = first_tick
@@ -188,7 +185,7 @@ class Electronics:
 
     def tick(self, time: float) -> int:
         """Return the counter at `time`."""
-        return self._first_tick + int((self._age(time) - self._age(self._power_up)) * self._ticks_a_second)
+        return self._first_tick + int((self._age(time) - self._age(self._power_up)) * self.pages.product.ticks)
 
     def time(self, tick: int) -> float:
         """Return the time at which the counter reaches `tick`."""
@@ -196,7 +193,7 @@ class Electronics:
 
     def times(self, ticks: list[int]) -> Array:
         """Return the times at which the counter reaches `ticks`."""
-        ages = self._age(self._power_up) + (np.array(ticks) - self._first_tick) / self._ticks_a_second
+        ages = self._age(self._power_up) + (np.array(ticks) - self._first_tick) / self.pages.product.ticks
         return self._faults.instants(ages)
 
     def _age(self, time: float) -> float:

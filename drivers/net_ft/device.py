@@ -265,7 +265,6 @@ class NetFtTransducer(ThreadedTransducer):
         )
 
     def _compare_clocks(self, counter: Indices, received_ns: Indices) -> None:
-        """Compare the box's counter with the session's clock."""
         breaks = self._account.restarted + self._account.frozen
         if breaks != self._breaks:  # it was frozen, or restarted
             self._breaks = breaks
