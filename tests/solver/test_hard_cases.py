@@ -20,10 +20,9 @@ from solver import (
     solve,
     solve_many,
 )
-from solver.verification.hard_cases import HardCase, cases, judge, suite
+from solver.verification.hard_cases import TELLING, Case, HardCase, cases, judge, measure
 from solver.verification.hard_cases.light import of_light_touch
 from solver.verification.hard_cases.outcome import Outcome, of_scene
-from solver.verification.hard_cases.suite import TELLING, Case
 from solver.verification.request import Request
 
 SUITE = {(case.kinematics, case.name): case for kind in ("small", "finite") for case in cases(kind)}
@@ -76,9 +75,11 @@ def test_a_case_that_fails_is_reported_as_one():
 def test_the_suite_compares_a_case_with_its_neighbour_wherever_that_stands(monkeypatch):
     first = Case("small", "nu 0.0", "answer", lambda: Outcome(True, (1.0,), "", ""), "last", 1e-3)
     last = Case("small", "last", "answer", lambda: Outcome(True, (2.0,), "", ""))
-    monkeypatch.setattr(suite, "cases", lambda kinematics: (first, last) if kinematics == "small" else ())
+    monkeypatch.setattr(
+        "solver.verification.hard_cases.cases", lambda kinematics: (first, last) if kinematics == "small" else ()
+    )
     for quick in (True, False):  # a quick run leaves the neighbour's own row out
-        rows = list(suite.measure(Request(quick, math.inf)))
+        rows = list(measure(Request(quick, math.inf)))
         assert next(row for row in rows if isinstance(row, HardCase)).flaw == "0.5 from last, not 0.001"
 
 

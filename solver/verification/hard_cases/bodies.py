@@ -18,6 +18,7 @@ from solver.mesh.mesher import Sizing
 from solver.prediction import percent
 from solver.scene.published import STICKINESS, scene
 from solver.verification.hard_cases.outcome import Outcome, agree, power
+from solver.verification.histories import press_and_slide
 from solver.verification.methods import Kinematics
 from solver.verification.published.bodies import distort
 
@@ -56,15 +57,6 @@ def _sed(finger: Finger, state: EquilibriumState) -> float:
     return finger.sed_ending(finger.displacement(state))
 
 
-def _whole_path(count: int) -> list[LoadState]:
-    """Return a press of `count` equal steps and a slide of as many, at least ten."""
-    press = [LoadState(depth, 0.3, 0.01) for depth in np.linspace(0.0, _DEPTH, count + 1)[1:].tolist()]
-    slide = [
-        LoadState(_DEPTH, 0.3, 0.01, travel=-far) for far in np.linspace(0.0, 10.0, max(count, 10) + 1)[1:].tolist()
-    ]
-    return press + slide
-
-
 def _beginning(count: int) -> list[LoadState]:
     """Return a press and a slide, each with up to twenty first steps of 1/`count` of the path, then long ones."""
     down = [_DEPTH * (i + 1) / count for i in range(min(count, 20))]
@@ -79,7 +71,9 @@ def _beginning(count: int) -> list[LoadState]:
 BODIES: dict[Kinematics, Bodies] = {
     "small": Bodies(
         _linear, lambda fineness: LinearFinger.of(scene(STICKINESS[0]), Sizing(fineness, _DEPTH, margin=4.0)),
-        8.0, -1, (0.005, 25, 200, 0.05), _whole_path, "1 to 10,000 steps", 5, 1e-10, 1e-9, 1e-12,
+        8.0, -1, (0.005, 25, 200, 0.05),
+        lambda count: press_and_slide(_DEPTH, 0.3, 0.01, 1, count, max(count, 10), 10.0),
+        "1 to 10,000 steps", 5, 1e-10, 1e-9, 1e-12,
     ),
     "finite": Bodies(
         _finite, lambda fineness: FiniteFinger.of(scene(STICKINESS[0]), Sizing(fineness, _DEPTH, margin=3.0)),
