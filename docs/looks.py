@@ -27,7 +27,7 @@ def page() -> str:
     lines = ["# Looks of the window", "", about, ""]
     lines += table(("type", "size at 100 %", "at 200 %"), [(n, f"{size}", f"{2 * size}") for n, size in sizes.items()])
     lines += [f"Everything keeps to a grid of {tokens.GRID}. What is pressed is at least {tokens.TARGET} high.", ""]
-    fields = [field.name for field in dataclasses.fields(tokens.Tokens) if field.name != "dark"]
+    fields = [field.name for field in dataclasses.fields(tokens.Tokens)]
     rows = [(name, *(f"`{getattr(theme, name)}`" for theme in THEMES.values())) for name in fields]
     lines += ["## Colours", "", *table(("token", *THEMES), rows)]
     about = "Ratios as WCAG 2.1 has them. Text needs 4.5. A selected row is `on_act` on `act`."

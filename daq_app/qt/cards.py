@@ -91,9 +91,8 @@ class CutShort(Panel):
         if sessions != self._items:
             self._items = sessions
             self._sessions.clear()
-            for session in sessions:
+            for index, session in enumerate(sessions):
                 self._sessions.addItem(session.description, str(session.folder))
-                index = self._sessions.count() - 1
                 self._sessions.setItemData(index, str(session.folder), Qt.ItemDataRole.ToolTipRole)
         self._sessions.setVisible(len(sessions) > 1)
         self.setVisible(bool(sessions))

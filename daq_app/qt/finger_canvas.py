@@ -137,10 +137,8 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
             picture = FingerPainter(painter, self._tokens, self.view(), self._plot_rect(), self.frame)
             picture.paint(self.look, self._shades[self.look.field.signed], self.sight.line)
         painter.setPen(QColor(self._tokens.quiet))
-        caption_box = QRectF(4.0, 0.0, self.width() - 8.0, self._above())
-        painter.drawText(
-            caption_box, int(Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap), breakable(self._caption)
-        )
+        caption_box, flags = QRectF(4.0, 0.0, self.width() - 8.0, self._above()), Qt.TextFlag.TextWordWrap
+        painter.drawText(caption_box, int(flags), breakable(self._caption))
 
     def paintEvent(self, event: QPaintEvent) -> None:
         pg.GraphicsLayoutWidget.paintEvent(self, event)

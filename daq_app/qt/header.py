@@ -34,9 +34,8 @@ class Header(QWidget):
         self._heading, self._device = label("", "title", wrap=True), label("", "quiet", wrap=True)
         self._language = label("", "quiet")
         for wrapped in (self._heading, self._device):
-            policy = wrapped.sizePolicy()
-            policy.setHorizontalPolicy(QSizePolicy.Policy.Ignored)  # they share the available width
-            wrapped.setSizePolicy(policy)
+            # They share the available width.
+            wrapped.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self._device.setMinimumHeight(px(TWO_LINES))  # parts below stay in place when the device's text grows
         self._simulated = label(tr("SIMULATED"), "simulated")
         self._lamp = Lamp(tr("recording"))

@@ -24,6 +24,7 @@ SAMPLE = 14  # length of the line sample before a curve's name, before the font'
 DASHES = 45  # thirds of a dash period in the displayed stretch
 _TOP = 2  # room above the names [px]
 LINES = 3  # height in lines of type below which a plot has no line for its names
+_MARK_STYLES = {"onset": Qt.PenStyle.SolidLine, "lift": Qt.PenStyle.DashLine, "steady": Qt.PenStyle.DotLine}
 FAR = 1e4  # distance to which values outside of the plot are clipped [px]
 
 
@@ -197,20 +198,14 @@ class LivePlot(PaintedWidget):
         free = inside.left()  # end of the text so far
         for mark in self._marks:
             start, stop = (inside.right() + (time - self._now) * across for time in (mark.start, mark.stop))
-            if mark.kind == "steady":
-                window = QRectF(start, inside.top(), stop - start, inside.height())
-                painter.fillRect(window, sheer(self.theme.act, 36))
-                painter.setPen(fine(self.theme.act, Qt.PenStyle.DotLine))
-                painter.drawLine(QPointF(start, inside.top()), QPointF(start, inside.bottom()))
-                painter.drawLine(QPointF(stop, inside.top()), QPointF(stop, inside.bottom()))
-                continue
-            onset = mark.kind == "onset"
-            painter.setPen(fine(self.theme.quiet, Qt.PenStyle.SolidLine if onset else Qt.PenStyle.DashLine))
-            painter.drawLine(QPointF(start, inside.top()), QPointF(start, inside.bottom()))
-            text = self._mark_texts[mark.kind]
-            if inside.bottom() - _TOP >= 5 * line:  # a lower plot has no room for text; plots above it have it
+            window, text = QRectF(start, inside.top(), stop - start, inside.height()), self._mark_texts.get(mark.kind)
+            painter.fillRect(window, sheer(self.theme.act, 36))
+            painter.setPen(fine(self.theme.quiet if text else self.theme.act, _MARK_STYLES[mark.kind]))
+            painter.drawLine(window.topLeft(), window.bottomLeft())
+            painter.drawLine(window.topRight(), window.bottomRight())
+            if text and inside.bottom() - _TOP >= 5 * line:  # a lower plot has no room for text; plots above it have it
                 width = text.size().width()
-                left = start - width - 3 if onset else start + 3
+                left = start - width - 3 if mark.kind == "onset" else start + 3
                 if free <= left <= inside.right() - width:
                     painter.drawStaticText(QPointF(left, _TOP + line), text)
                     free = left + width

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Callable, Mapping
 from functools import partial
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from platform import python_version
 from typing import TYPE_CHECKING, Literal
@@ -31,6 +30,7 @@ from daq_app.qt.preferences import name_of, recent_sessions, remember_session
 from daq_app.qt.tokens import GRID, px, theme_of
 from daq_app.window.state import NewSession
 from daq_app.wording import EXPERIMENTER, languages, tr, tr_noop
+from sessions.recording.head import installed_version
 
 if TYPE_CHECKING:
     from daq_app.qt.analyst_window import AnalystWindow
@@ -173,15 +173,8 @@ def about_box(parent: QWidget) -> QMessageBox:
 
 def about_text() -> str:
     """Return the versions of the program and of its libraries."""
-    versions = [f"daq-app {_version('daq-app')}", f"Python {python_version()}", f"Qt {qVersion()}"]
-    return "\n".join((*versions, *(f"{name} {_version(name)}" for name in _LIBRARIES)))
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return tr("unknown")
+    own, *libraries = (f"{name} {installed_version(name) or tr('unknown')}" for name in ("daq-app", *_LIBRARIES))
+    return "\n".join((own, f"Python {python_version()}", f"Qt {qVersion()}", *libraries))
 
 
 class ReviewRoom(QWidget):

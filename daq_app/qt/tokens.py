@@ -26,7 +26,6 @@ FX, FY, N, T, MU, MODEL = "#0072B2", "#E69F00", "#56B4E9", "#D55E00", "#CC79A7",
 class Tokens:
     """One theme."""
 
-    dark: bool
     ground: str  # of the window
     surface: str  # of panels
     raised: str  # of pressable parts
@@ -41,11 +40,11 @@ class Tokens:
 
 
 LIGHT = Tokens(
-    dark=False, ground="#eceeef", surface="#f8f9f9", raised="#ffffff", line="#c3c8cb", text="#14181a", quiet="#535c61",
+    ground="#eceeef", surface="#f8f9f9", raised="#ffffff", line="#c3c8cb", text="#14181a", quiet="#535c61",
     act="#0b5a8a", on_act="#ffffff", wrong="#b3261e", look="#8a5a00", record="#c5221f",
 )  # fmt: skip
 DARK = Tokens(
-    dark=True, ground="#16191b", surface="#1e2224", raised="#2a2f32", line="#454c50", text="#eef1f2", quiet="#a4adb2",
+    ground="#16191b", surface="#1e2224", raised="#2a2f32", line="#454c50", text="#eef1f2", quiet="#a4adb2",
     act="#7cc4f0", on_act="#0b1a24", wrong="#ff8a80", look="#f3c15c", record="#ff5a52",
 )  # fmt: skip
 

@@ -92,8 +92,8 @@ def software_versions() -> dict[str, str]:
 
     `blas` and `simd` too: the last bits of a sum depend on the library and the processor's vector width.
     """
-    versions = {"daq-app": _version("daq-app") or "not installed", "python": platform.python_version()}
-    libraries = {name: _version(name) for name in (*_LIBRARIES, *OPTIONAL)}
+    versions = {"daq-app": installed_version("daq-app") or "not installed", "python": platform.python_version()}
+    libraries = {name: installed_version(name) for name in (*_LIBRARIES, *OPTIONAL)}
     arithmetic: Any = np.show_config(mode="dicts")
     blas = arithmetic.get("Build Dependencies", {}).get("blas", {})
     simd = arithmetic.get("SIMD Extensions", {})
@@ -107,7 +107,8 @@ def software_versions() -> dict[str, str]:
 
 
 @cache  # the metadata of one library take milliseconds to parse, and a loaded library does not change
-def _version(name: str) -> str | None:
+def installed_version(name: str) -> str | None:
+    """Return the version of an installed package; None without it."""
     try:
         return version(name)
     except PackageNotFoundError:

@@ -14,9 +14,8 @@ from PySide6.QtCore import QEvent, QSettings, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from daq_app.qt.garbage import GarbageCollector
 from daq_app.qt.preferences import SCALE, settings, type_scale
-from daq_app.qt.start import open_window
+from daq_app.qt.start import collect_between_events, open_window
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import LIGHT, style_sheet
 from daq_app.recorder.client import Recorder
@@ -108,9 +107,9 @@ def application(tmp_path_factory):
 @pytest.fixture(scope="module", autouse=True)
 def no_window_stays(application):
     """Collect as the program does, and delete every window after its file: one that stays is styled with the next."""
-    collector = GarbageCollector(application)
-    collector.begin()
+    timer = collect_between_events(application)
     yield
+    timer.stop()
     for widget in application.topLevelWidgets():
         if type(widget).__module__.startswith("daq_app.") and widget.parent() is None:
             widget.deleteLater()
@@ -118,7 +117,7 @@ def no_window_stays(application):
     gc.unfreeze()  # an opening window keeps all there is from collection
     gc.collect()
     gc.freeze()
-    collector.end()
+    gc.enable()
 
 
 @pytest.fixture

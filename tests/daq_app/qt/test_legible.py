@@ -241,7 +241,7 @@ def settle(application):
 @pytest.mark.parametrize(
     ("size", "scale", "theme"),
     [
-        pytest.param(size, scale, theme, marks=[] if (size, scale, theme.dark) in QUICK else SLOW)
+        pytest.param(size, scale, theme, marks=[] if (size, scale, theme is tokens.DARK) in QUICK else SLOW)
         for size in SCREENS
         for scale in SCALES
         for theme in (tokens.LIGHT, tokens.DARK)
