@@ -5,7 +5,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QEvent, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QSignalBlocker, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import QFileDialog, QLabel, QMainWindow, QProgressBar, QSizePolicy, QTabWidget, QWidget
 
@@ -16,7 +16,7 @@ from daq_app.analyst.state import AnalystState, fold, rows, selected_row
 from daq_app.qt.keys import ANALYST_KEYS, KeysPage
 from daq_app.qt.layout import hbox, scroll_area, set_horizontal, vbox
 from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
-from daq_app.qt.parts import Panel, WrappedLabel, button, choice, label, row_list, whole_facts
+from daq_app.qt.parts import Panel, RowList, WrappedLabel, button, choice, label, whole_facts
 from daq_app.qt.plots import ZoomedPlot, pg
 from daq_app.qt.stroke_column import StrokeColumn
 from daq_app.qt.tokens import GRID, MODEL, Tokens, px, theme_of
@@ -267,7 +267,7 @@ class TrialsColumn(QWidget):
         """Show no trials; `ask` takes the chosen row, `respond` the quantity to compare with the score."""
         super().__init__()
         self._tokens, self._ask = tokens, ask
-        self.list = row_list(tr("trials"))
+        self.list = RowList(tr("trials"))
         self.list.currentRowChanged.connect(self._choose)
         self.responses = choice(tr("quantity compared with the score"))
         for response in (shown_response(quantity.name) for quantity in QUANTITIES):
@@ -287,18 +287,17 @@ class TrialsColumn(QWidget):
         vbox(label(tr("Trials"), "section"), (self.list, 3), self._below, self.responses, self.errors, *plot, on=self)
 
     def show_state(self, state: AnalystState) -> None:
-        lines = tuple(row_text(row) for row in rows(state))
-        self.list.blockSignals(True)
-        if len(lines) != self.list.count():
-            self.list.clear()
-            self.list.addItems(lines)
-        for index, row in enumerate(rows(state)):
-            item, marks = self.list.item(index), marks_of(row)
-            item.setText(whole_facts(lines[index]))
-            item.setToolTip(marks)
-            item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{lines[index]} {marks}".rstrip())
-        self.list.setCurrentRow(state.row if selected_row(state) is not None else -1)
-        self.list.blockSignals(False)
+        trials = rows(state)
+        with QSignalBlocker(self.list):
+            if len(trials) != self.list.count():
+                self.list.clear()
+                self.list.addItems([""] * len(trials))
+            for index, row in enumerate(trials):
+                item, text, marks = self.list.item(index), row_text(row), marks_of(row)
+                item.setText(whole_facts(text))
+                item.setToolTip(marks)
+                item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{text} {marks}".rstrip())
+            self.list.setCurrentRow(state.row if selected_row(state) is not None else -1)
         self.errors.show_text(greatest_errors(state.report, state.response))
         marks = {True: {"size": 18, "symbol": "s"}, False: {"size": 11, "symbol": "o"}}
         alike = {"brush": MODEL, "pen": pg.mkPen(QColor(self._tokens.text))}
@@ -309,7 +308,7 @@ class TrialsColumn(QWidget):
         self.points.setData(spots)
         self.relation.setVisible(bool(spots))
         self.none.setVisible(not spots)
-        empty = state.report is not None and not lines
+        empty = state.report is not None and not trials
         for widget in (self.list, self._below, self.responses):
             widget.setHidden(empty)
         text = tr("No trial has both a score and an answer of the model.")

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QGridLayout, QListWidget, QWidget
 
 from daq_app.qt.keys import KEYS
 from daq_app.qt.layout import hbox, stack_pages, vbox
-from daq_app.qt.parts import EntryLine, Panel, button, label, row_list, set_text, whole_facts
+from daq_app.qt.parts import EntryLine, Panel, RowList, button, label, set_text, whole_facts
 from daq_app.qt.preferences import type_scale
 from daq_app.qt.subject_picture import Mirror
 from daq_app.qt.tokens import GRID, TARGET, px
@@ -33,7 +33,7 @@ class CoursePanel(Panel):
         self._view: CourseView | None = None
         self._act = ""
         self._question_text = ""  # the question above the line
-        self.plan = row_list(tr("plan: trials done, current and to come"))
+        self.plan = RowList(tr("plan: trials done, current and to come"))
         self.buttons = {act: button("", tr(_DESCRIPTIONS[act]), partial(self.ask, act), "small") for act in ACTS}
         self.line = EntryLine(self._keep, self.leave)
         self.line.setAccessibleName(tr("reason or note"))

@@ -163,14 +163,15 @@ def choice(name: str, entries: Iterable[str] = ()) -> QComboBox:
     return box
 
 
-def row_list(name: str) -> QListWidget:
-    """Return a list whose rows wrap if they are longer than its width."""
-    rows = QListWidget()
-    rows.setAccessibleName(name)
-    rows.setWordWrap(True)
-    rows.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-    rows.setResizeMode(QListWidget.ResizeMode.Adjust)
-    return rows
+class RowList(QListWidget):
+    """A list whose rows wrap if they are longer than its width."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.setAccessibleName(name)
+        self.setWordWrap(True)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setResizeMode(QListWidget.ResizeMode.Adjust)
 
 
 class EntryLine(QLineEdit):

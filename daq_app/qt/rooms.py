@@ -25,7 +25,7 @@ from daq_app.qt import preferences
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.keys import KEYS
 from daq_app.qt.layout import hbox, vbox
-from daq_app.qt.parts import Panel, button, label, row_list, set_text
+from daq_app.qt.parts import Panel, RowList, button, label, set_text
 from daq_app.qt.preferences import name_of, recent_sessions, remember_session
 from daq_app.qt.tokens import GRID, px, theme_of
 from daq_app.window.state import NewSession
@@ -184,7 +184,7 @@ class ReviewRoom(QWidget):
         super().__init__()
         self.analyst: AnalystWindow | None = None
         self._has_room = False  # for the list next to an open session
-        self.recent = row_list(tr("recent sessions"))
+        self.recent = RowList(tr("recent sessions"))
         self.recent.itemActivated.connect(self._open_item)
         self.recent.itemClicked.connect(self._open_item)
         self._none = label("", "title", wrap=True)

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QEvent, QSize, Qt, QTimer
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent, QPixmap
-from PySide6.QtWidgets import QDialog, QListWidget, QSizePolicy, QWidget
+from PySide6.QtWidgets import QDialog, QSizePolicy, QWidget
 
 from daq_app.qt.layout import hbox, vbox
 from daq_app.qt.painting import paint_fitted
-from daq_app.qt.parts import Openness, WrappedLabel, button, label
+from daq_app.qt.parts import Openness, RowList, WrappedLabel, button, label
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID, missing_glyphs, px
 from daq_app.window.new_session import Refusal, SessionForm
@@ -147,12 +147,9 @@ class SubjectPreview(QDialog):
         self.setAccessibleName(tr("preview of the subject's pages"))
         self._pages, self._size = tuple(pages), size
         self.picture = SubjectPicture(size)
-        self.list = _Pages()
-        self.list.setAccessibleName(tr("pages that the subject will see"))
+        self.list = _Pages(tr("pages that the subject will see"))
         self.list.addItems([page.name for page in self._pages])
         self.list.setFixedWidth(px(LIST, most=1.5))
-        self.list.setWordWrap(True)
-        self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.lost = WrappedLabel("value", "look")
         self.back = button(tr("◂ Back"), tr("the page before"), lambda: self.list.turn(-1))
         self.forward = button(tr("Forward ▸"), tr("the next page"), lambda: self.list.turn(1))
@@ -176,7 +173,7 @@ class SubjectPreview(QDialog):
         self._count.setText(tr("{row} of {len}", row=row + 1, len=len(self._pages)))
 
 
-class _Pages(QListWidget):
+class _Pages(RowList):
     """A list that also accepts the keys for turning pages."""
 
     def turn(self, step: int) -> None:

@@ -160,7 +160,7 @@ class SubjectWindow(QWidget):
         self._scale.fit()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Treat Enter as Next, and pass every other key of the answer to its field."""
+        """Treat Enter and Space as Next, and F11 as the switch of the full screen."""
         if self.scoring and not self.measuring and event.key() in GIVING:
             self.take_key(event)
         elif event.key() == Qt.Key.Key_F11:

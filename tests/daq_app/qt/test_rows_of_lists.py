@@ -2,7 +2,7 @@
 
 import pytest
 
-from daq_app.qt.parts import row_list
+from daq_app.qt.parts import RowList
 
 pytestmark = pytest.mark.qt
 
@@ -10,7 +10,7 @@ LONG, SHORT = "✓  12  K50   µ 0.44   number 0.125   flawed", "○  13  R35"
 
 
 def test_a_row_that_is_longer_than_its_list_is_wide_takes_as_many_lines_as_it_needs(application):
-    rows = row_list("plan")
+    rows = RowList("plan")
     rows.addItems([LONG, SHORT])
     rows.show()  # in the style that the application has
     words = rows.fontMetrics().horizontalAdvance(LONG)
