@@ -42,31 +42,33 @@ _MARK = Column("simulated", "", "1: transducer or subject were simulated", ())
 def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     """Write the data set into an empty folder."""
     recording = source.recording
-    names = _Names(recording)
-    write_json(folder / "dataset_description.json", _dataset(recording, "raw", recording.provenance["software"]))
-    (folder / "README.md").write_text(_readme(recording), encoding="utf-8")
-    _write_table(folder / "participants", _participants(recording, names), recording)
-    beh = folder / names.subject / "beh"
-    beh.mkdir(parents=True)
+    derivatives = folder / "derivatives" / PIPELINE
+    subject = f"sub-{_label(recording.plan.subject)}"
+    task = {"TaskName": _label(recording.plan.protocol), "TaskDescription": f"protocol {recording.plan.protocol}"}
+    stem = f"{subject}_task-{task['TaskName']}"
+    for place, kind, software in (
+        (folder, "raw", recording.provenance["software"]),
+        (derivatives, "derivative", source.analysis["made_by"]),
+    ):
+        (place / subject / "beh").mkdir(parents=True)
+        write_json(place / "dataset_description.json", _dataset(recording, kind, software))
+        (place / "README.md").write_text(_readme(recording), encoding="utf-8")
+    _write_table(folder / "participants", _participants(recording, subject), recording)
+    beh = folder / subject / "beh"
     by_name = {table.name: table for table in tables(source)}
-    task = {"TaskName": names.task, "TaskDescription": f"protocol {recording.plan.protocol}"}
     instructions = task | {"Instructions": " / ".join(block.instruction for block in recording.plan.blocks)}
-    _write_table(beh / f"{names.stem}_beh", by_name["trials"], recording, instructions)
+    _write_table(beh / f"{stem}_beh", by_name["trials"], recording, instructions)
     session = {"DaqAppSession": description(recording)}  # all that is needed to restore the session
-    _write_table(beh / f"{names.stem}_events", _events(recording), recording, instructions | session)
+    _write_table(beh / f"{stem}_events", _events(recording), recording, instructions | session)
     if recording.info is not None:
-        _write_readings(recording, beh, names, progress)
+        _write_readings(recording, beh / stem, task["TaskName"], progress)
     for name, content in side_files(recording.folder).items():
         (folder / SOURCE).mkdir(exist_ok=True)
         (folder / SOURCE / name).write_bytes(content)
-    derivatives = folder / "derivatives" / PIPELINE
-    beh_folder = derivatives / names.subject / "beh"
-    beh_folder.mkdir(parents=True)
-    write_json(derivatives / "dataset_description.json", _dataset(recording, "derivative", source.analysis["made_by"]))
-    (derivatives / "README.md").write_text(_readme(recording), encoding="utf-8")
     for name in DERIVED:
         if name in by_name:
-            _write_table(beh_folder / f"{names.stem}_desc-{name}_beh", by_name[name], recording, task)
+            derived = derivatives / subject / "beh" / f"{stem}_desc-{name}_beh"
+            _write_table(derived, by_name[name], recording, task)
 
 
 def find(path: Path) -> Path | None:
@@ -92,17 +94,8 @@ def read(path: Path) -> ExportedSession:
     return ExportedSession("bids", path, head, events, lambda: _blocks(files), side_files(path / SOURCE))
 
 
-class _Names:
-    """Names of a session's files: letters and digits only."""
-
-    def __init__(self, recording: Recording) -> None:
-        self.subject = f"sub-{_label(recording.plan.subject)}"
-        self.task = _label(recording.plan.protocol)
-        self.stem = f"{self.subject}_task-{self.task}"
-
-
 def _label(text: str) -> str:
-    """Return a text as a BIDS label.
+    """Return a text as a BIDS label: letters and digits only.
 
     >>> _label("sensotact-friction")
     'sensotactfriction'
@@ -128,11 +121,11 @@ def _dataset(recording: Recording, dataset_type: str, software: Mapping[str, str
     }
 
 
-def _participants(recording: Recording, names: _Names) -> Table:
+def _participants(recording: Recording, participant: str) -> Table:
     plan = recording.plan
     simulated = "subject" in (recording.simulated_sentence or "")
     columns = (
-        Column("participant_id", "", "BIDS label of the participant", (names.subject,)),
+        Column("participant_id", "", "BIDS label of the participant", (participant,)),
         Column("code", "", "code of the participant, never a name", (plan.subject,)),
         Column("stroking_hand", "", "hand that stroked; n/a: nobody stated it", (plan.stroking_hand,)),
         Column("answering_hand", "", "hand that answered; n/a: nobody stated it", (plan.answering_hand,)),
@@ -154,39 +147,38 @@ def _events(recording: Recording) -> Table:
 # ---- readings
 
 
-def _write_readings(recording: Recording, folder: Path, names: _Names, progress: Progress) -> None:
+def _write_readings(recording: Recording, begin: Path, task: str, progress: Progress) -> None:
+    """Write the readings, one file for each stretch; the names of all files start with the path `begin`."""
     assert recording.info is not None
     calibration = recording.info.calibration
     table_columns = [*columns(calibration), *([_MARK] if recording.simulated else [])]
     mark = (1,) if recording.simulated else ()
     first_ns = recording.events[0].time_ns if recording.events else 0
-    total = recording.expected_readings or 1
-    several = any(stretch > 1 for stretch, _ in _stretches(recording))
-    count = 0
-    for stretch, blocks in groupby(_stretches(recording), itemgetter(0)):
-        stem = f"{names.stem}{f'_recording-{stretch}' if several else ''}_physio"
+    rate = recording.info.rate
+    several = any(stretch > 1 for stretch, _ in _stretches(recording.blocks(), rate))
+    stretches = _stretches(recording.blocks_with_progress(progress), rate)
+    for stretch, blocks in groupby(stretches, itemgetter(0)):
+        stem = f"{begin.name}{f'_recording-{stretch}' if several else ''}_physio"
         last_number: int | None = None
-        with _open_gzip(folder / f"{stem}.tsv.gz") as file:
+        with _open_gzip(begin.with_name(f"{stem}.tsv.gz")) as file:
             for _, block in blocks:
                 if last_number is None:
                     sidecar = {
                         **recording.mark,
-                        "SamplingFrequency": _sampling_frequency(recording.info.rate, block),
+                        "SamplingFrequency": _sampling_frequency(rate, block),
                         "StartTime": (int(block.received_ns[0]) - first_ns) * 1e-9,
                         "PhysioType": "generic",
-                        "TaskName": names.task,
+                        "TaskName": task,
                         "Columns": [column.heading for column in table_columns],
                         "Manufacturer": recording.info.driver,
                         "ManufacturersModelName": recording.info.model,
                         "DeviceSerialNumber": recording.info.serial,
                         **{column.heading: _describe(column) for column in table_columns},
                     }
-                    write_json(folder / f"{stem}.json", sidecar)
+                    write_json(begin.with_name(f"{stem}.json"), sidecar)
                 complete_rows = _rows_with_gaps(block, last_number, rows(block, calibration), len(table_columns), mark)
                 write_rows(file, complete_rows, "\t")
                 last_number = int(block.sequence[-1])
-                count += len(block)
-                progress(min(count / total, 1.0))
 
 
 def _sampling_frequency(rate: float, block: ReadingBlock) -> float | None:
@@ -197,16 +189,13 @@ def _sampling_frequency(rate: float, block: ReadingBlock) -> float | None:
     return (len(block) - 1) / span if span > 0.0 else None
 
 
-def _stretches(recording: Recording) -> Iterator[tuple[int, ReadingBlock]]:
-    """Yield the readings in order, each block with the number of its unbroken stretch, from 1."""
+def _stretches(blocks: Iterable[ReadingBlock], rate: float) -> Iterator[tuple[int, ReadingBlock]]:
+    """Yield the readings in order, each block with the number of its unbroken stretch, from 1; `rate` in Hz or nan."""
     last_time: float | None = None
     last_number: int | None = None
     stretch = 0
-    rate = recording.info.rate if recording.info is not None else math.nan
     largest_gap = BREAK * rate if math.isfinite(rate) else math.inf
-    for block in recording.blocks():
-        if not len(block):
-            continue
+    for block in filter(len, blocks):
         steps = np.diff(block.time, prepend=np.nan if last_time is None else last_time)
         gaps = np.diff(block.sequence, prepend=block.sequence[0] if last_number is None else last_number) - 1
         breaks = [int(i) for i in np.flatnonzero(~(np.abs(steps) <= BREAK) | (gaps > largest_gap))]

@@ -3,8 +3,9 @@
 import csv
 import io
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from drivers.readings import ReadingBlock
 from sessions.exchange import ExportSource, Progress
@@ -23,16 +24,23 @@ _SIMULATED = Column("SIMULATED", "", "yes: transducer or subject were simulated"
 def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     """Write the session into an empty folder."""
     recording = source.recording
-    session_tables = [*tables(source), Table("events", EACH_EVENT, event_columns(recording.events))]
-    mark = (_SIMULATED,) if recording.simulated_sentence else ()
-    for table in session_tables:
-        with (folder / f"{table.name}.csv").open("w", encoding="utf-8", newline="") as file:
-            _write_rows(file, mark, [[column.heading for column in table.columns]], table.rows)
-    contents = [(f"{table.name}.csv", table.meaning, (*mark, *table.columns)) for table in session_tables]
+    mark = (_SIMULATED,) if recording.simulated else ()
+    contents: list[tuple[str, str, Sequence[Column]]] = []
+
+    def add(name: str, meaning: str, table_columns: Sequence[Column], table_rows: Iterable[Sequence[Any]]) -> None:
+        columns_here = (*mark, *table_columns)
+        with (folder / name).open("w", encoding="utf-8", newline="") as file:
+            write_rows(file, [[column.heading for column in columns_here]])
+            write_rows(file, ([*("yes" for _ in mark), *row] for row in table_rows))
+        contents.append((name, meaning, columns_here))
+
+    for table in (*tables(source), Table("events", EACH_EVENT, event_columns(recording.events))):
+        add(f"{table.name}.csv", table.meaning, table.columns, table.rows)
     if recording.info is not None:
-        meaning = "a row for each reading, in the order recorded"
-        contents.append((_READINGS, meaning, (*mark, *columns(recording.info.calibration))))
-        _write_readings(recording, mark, folder / _READINGS, progress)
+        calibration = recording.info.calibration
+        blocks = recording.blocks_with_progress(progress)
+        reading_rows = chain.from_iterable(rows(block, calibration) for block in blocks)
+        add(_READINGS, "a row for each reading, in the order recorded", columns(calibration), reading_rows)
     write_json(folder / DESCRIPTION_FILE, description(recording))
     for name, document in (("analysis.json", source.analysis), ("prediction.json", source.prediction)):
         if document is not None:
@@ -53,25 +61,6 @@ def read(path: Path) -> ExportedSession:
     rows_read = csv.DictReader(io.StringIO(read_within_limit(path / EVENTS).decode(), newline=""))
     events = tuple(logged_event({name: plain(cell) for name, cell in row.items()}, "kind") for row in rows_read)
     return ExportedSession("csv", path, head, events, lambda: _read_readings(path / _READINGS), side_files(path))
-
-
-def _write_rows(file: TextIO, mark: Sequence[Column], header: list[list[str]], rows: Iterable[Sequence[Any]]) -> None:
-    """Write a header and rows; with a `mark` its column comes first."""
-    write_rows(file, [[*(column.heading for column in mark), *names] for names in header])
-    write_rows(file, ([*("yes" for _ in mark), *row] for row in rows))
-
-
-def _write_readings(recording: Recording, mark: Sequence[Column], path: Path, progress: Progress) -> None:
-    assert recording.info is not None
-    calibration = recording.info.calibration
-    total = recording.expected_readings or 1
-    count = 0
-    with path.open("w", encoding="utf-8", newline="") as file:
-        _write_rows(file, mark, [[column.heading for column in columns(calibration)]], ())
-        for block in recording.blocks():
-            _write_rows(file, mark, [], rows(block, calibration))
-            count += len(block)
-            progress(min(count / total, 1.0))
 
 
 def _read_readings(path: Path) -> Iterator[ReadingBlock]:

@@ -4,7 +4,7 @@ import errno
 import shutil
 import sqlite3
 import tempfile
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -116,11 +116,6 @@ class Recording:
         return tuple(problems)
 
     @property
-    def expected_readings(self) -> int:
-        """Return the number of readings in the file, by its events."""
-        return max((event.readings for event in self.events), default=0)
-
-    @property
     def flaws(self) -> tuple[str, ...]:
         """Return a sentence for each problem during recording, from the event log."""
         losses = [event for event in self.events if event.kind == "losses"]
@@ -209,6 +204,15 @@ class Recording:
                 yield from _blocks(connection, damage, span)
         except DATABASE_FAILURES as error:
             damage.append(f"{schema.LIVE_FILE} cannot be read to its end ({error})")
+
+    def blocks_with_progress(self, progress: Callable[[float], None]) -> Iterator[ReadingBlock]:
+        """Yield the readings block by block, and report the part done, 0 to 1, after each."""
+        expected = max((event.readings for event in self.events), default=0) or 1
+        count = 0
+        for block in self.blocks():
+            yield block
+            count += len(block)
+            progress(min(count / expected, 1.0))
 
 
 def _copy_of(folder: Path) -> str:

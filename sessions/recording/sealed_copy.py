@@ -140,10 +140,12 @@ class DataSet:
 
 
 def write_copy(
-    recording: Recording, path: Path, further: Iterable[DataSet] = (), progress: Callable[[float], None] | None = None
+    recording: Recording,
+    path: Path,
+    further: Iterable[DataSet] = (),
+    progress: Callable[[float], None] = lambda _: None,
 ) -> None:
     """Write the copy of a recording, and the data sets `further`, to a new file at `path`. Raises OSError."""
-    total = recording.expected_readings or 1
     with new_hdf5(path, libver=LIBVER) as file:
         if recording.simulated_sentence:
             file.attrs["SIMULATED"] = _attribute(recording.simulated_sentence)
@@ -157,13 +159,11 @@ def write_copy(
                 f"readings/{name}", (0, *width), dtype, maxshape=(None, *width), chunks=(CHUNK, *width), fletcher32=True
             )
             _describe(readings[name], *READING_NOTES[name])
-        for block in recording.blocks():
+        for block in recording.blocks_with_progress(progress):
             for name, column in readings.items():
                 values = getattr(block, name)
                 column.resize(len(column) + len(values), axis=0)
                 column[-len(values) :] = values
-            if progress is not None:
-                progress(min(len(readings["time"]) / total, 1.0))
         for entry in (*data_sets(recording), *further):
             dtype = entry.values.dtype
             if dtype.kind == "S":
