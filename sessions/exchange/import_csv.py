@@ -52,12 +52,6 @@ class Columns:
     units_origin: Origin
 
     @property
-    def scales(self) -> tuple[float, ...]:
-        """Factor of each axis' unit to N or N mm."""
-        force, torque = self.units
-        return (FORCE_UNITS[force],) * 3 + (TORQUE_UNITS[torque],) * 3
-
-    @property
     def extra(self) -> tuple[str, ...]:
         """Names of the columns that are neither time nor axis."""
         identified = {self.time, *self.axes}
@@ -320,12 +314,13 @@ def _says_simulated(content: bytes, names: Sequence[str]) -> bool:
 def _info(
     path: Path, layout: Columns, rate: float, rate_origin: Origin, options: ImportOptions, *, simulated: bool
 ) -> TransducerInfo:
+    force, torque = layout.units
     calibration = Calibration(
         serial="unknown",
         raw_unit="N, N mm",
-        matrix=np.diag(layout.scales),
+        matrix=np.diag(np.repeat([FORCE_UNITS[force], TORQUE_UNITS[torque]], 3)),
         rated=np.full(6, np.nan),
-        source=f"none: the file holds a wrench, forces in {layout.units[0]} and torques in {layout.units[1]}",
+        source=f"none: the file holds a wrench, forces in {force} and torques in {torque}",
     )
     settings = {"rate": "from the file's times" if rate_origin == "measured" else "stated, the file has no times"}
     if options.zeroed:

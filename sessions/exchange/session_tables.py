@@ -8,7 +8,7 @@ import json
 import math
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ from sessions.toml_file import from_table, toml_text
 Cell = str | int | float | None
 Columns = Mapping[str, tuple[str, str]]  # by name: unit ("" for none) and meaning
 WRENCH = (("Fx", "N"), ("Fy", "N"), ("Fz", "N"), ("Tx", "N mm"), ("Ty", "N mm"), ("Tz", "N mm"))
+_ZERO = {f"zero_{axis}": unit for axis, unit in WRENCH}
 _COLUMNS: Mapping[str, Any] = tomllib.loads((Path(__file__).parent / "columns.toml").read_text("utf-8"))
 
 
@@ -70,7 +71,7 @@ def _columns(record: type, name: str) -> dict[str, tuple[str, str]]:
 TRIAL = {
     **_columns_of("trial"),
     "outcome": ("", OUTCOMES),
-    **{f"zero_{axis}": (unit, "of the wrench in the take's unloaded stretch") for axis, unit in WRENCH},
+    **{name: (unit, "of the wrench in the take's unloaded stretch") for name, unit in _ZERO.items()},
 }
 _STROKE = _columns(Stroke, "stroke")
 _FRICTION = _columns(FrictionParameters, "friction")
@@ -212,25 +213,22 @@ def _force_intervals(interval: Mapping[str, Any] | None) -> dict[str, Any]:
 
 def trials(recording: Recording) -> Table:
     """Return a row for each planned trial, in the plan's order."""
-    rows: list[dict[str, Any]] = []
-    for record in recording.trials:
-        trial = record.trial
-        zero = _zero(recording, trial.number, record.start_ns)
-        of_stimulus, of_trial = ("descriptor", "index", "code"), ("block", "direction", "repetition", "phase")
-        rows.append(
-            {
-                "trial": trial.number,
-                **{name: getattr(trial.stimulus, name) for name in of_stimulus},
-                **{name: getattr(trial, name) for name in (*of_trial, "compared_with")},
-                "standard": int(trial.standard),
-                **{name: getattr(record, name) for name in ("outcome", "score", "choice")},
-                "free_number": record.number,
-                "take": record.take.number if record.take else None,
-                "start": record.start_ns,
-                "stop": record.stop_ns,
-                **{f"zero_{axis}": value for (axis, _), value in zip(WRENCH, zero, strict=True)},
-            }
-        )
+    rows = [
+        {
+            "trial": record.trial.number,
+            **asdict(record.trial.stimulus),
+            **{name: getattr(record.trial, name) for name in ("block", "direction", "repetition", "phase")},
+            "compared_with": record.trial.compared_with,
+            "standard": int(record.trial.standard),
+            **{name: getattr(record, name) for name in ("outcome", "score", "choice")},
+            "free_number": record.number,
+            "take": record.take.number if record.take else None,
+            "start": record.start_ns,
+            "stop": record.stop_ns,
+            **dict(zip(_ZERO, _zero(recording, record.trial.number, record.start_ns), strict=True)),
+        }
+        for record in recording.trials
+    ]
     return _table("trials", "a row for each planned trial", rows, TRIAL)
 
 

@@ -30,7 +30,7 @@ from sessions.file_access import (
     write_whole,
 )
 from sessions.plan.orders import opaque_codes, shuffle
-from sessions.plan.plan import SessionPlan, Trial
+from sessions.plan.plan import Trial
 from sessions.plan.protocols.planning import CODE_RULE, Body, StudyPlace, check_body, design_rows, is_code
 from sessions.plan.protocols.protocol import Labels, Protocol, new_protocol
 from sessions.toml_file import SettingsError, from_toml
@@ -80,10 +80,6 @@ class Key(msgspec.Struct, frozen=True):
         if stimulus is None:
             raise ValueError(f"the key has no stimulus {trial.stimulus.code}")
         return replace(trial, stimulus=replace(trial.stimulus, index=stimulus.index))
-
-    def plan(self, plan: SessionPlan) -> SessionPlan:
-        """Return a blinded plan with the index of every stimulus."""
-        return plan.with_trials(self.reveal)
 
 
 class StudyError(Exception):

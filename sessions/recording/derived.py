@@ -200,7 +200,7 @@ def reveal(recording: Recording) -> Recording:
         key = as_type(stored["key"], Key)
         if key.sha256 != recording.plan.key_sha256:
             raise ValueError("its SHA-256 is not that in the plan")
-        plan = key.plan(recording.plan)
+        plan = recording.plan.with_trials(key.reveal)
     except (ValueError, KeyError, TypeError) as error:
         raise RecordingError(
             f"{path} is not the key that was sealed ({error}); delete it, and unblind the session anew"
