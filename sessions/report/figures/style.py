@@ -33,8 +33,7 @@ PALE = "#d9d9d9"
 _TEXT = 8.5  # [pt]
 _POINTS = 72.0  # per inch: the unit of SVG layout
 DOTS = 220  # per inch of a picture in pixels
-_PIXELS: ContextVar[dict[str, bytes] | None] = ContextVar("pixels", default=None)  # see `in_pixels`
-_NOTE: ContextVar[str] = ContextVar("note", default="")  # see `in_pixels`
+_PIXELS: ContextVar[tuple[str, dict[str, bytes]] | None] = ContextVar("pixels", default=None)  # see `in_pixels`
 _SIMULATED: ContextVar[bool] = ContextVar("simulated", default=False)  # see `look`
 _LOOK: dict[Any, Any] = {
     "font.family": "sans-serif",
@@ -44,25 +43,14 @@ _LOOK: dict[Any, Any] = {
     "svg.fonttype": "none",
     "text.parse_math": False,  # a name may hold dollar signs
     "text.hinting": "no_hinting",  # hinting would narrow the letters of the layout, not the reader's
-    "font.size": _TEXT,
-    "axes.titlesize": _TEXT,
+    **dict.fromkeys(("font.size", "axes.titlesize", "axes.labelsize"), _TEXT),
+    **dict.fromkeys(("xtick.labelsize", "ytick.labelsize"), _TEXT - 0.5),
+    **dict.fromkeys(("axes.linewidth", "xtick.major.width", "ytick.major.width"), 0.6),
+    **dict.fromkeys(("axes.edgecolor", "xtick.color", "ytick.color"), GREY),
+    **dict.fromkeys(("axes.labelcolor", "text.color", "xtick.labelcolor", "ytick.labelcolor"), INK),
+    **dict.fromkeys(("axes.spines.top", "axes.spines.right"), False),
     "axes.titlelocation": "left",
     "axes.titlepad": 5.0,
-    "axes.labelsize": _TEXT,
-    "xtick.labelsize": _TEXT - 0.5,
-    "ytick.labelsize": _TEXT - 0.5,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.linewidth": 0.6,
-    "axes.edgecolor": GREY,
-    "axes.labelcolor": INK,
-    "text.color": INK,
-    "xtick.color": GREY,
-    "ytick.color": GREY,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
     "lines.solid_capstyle": "round",
     "axes.unicode_minus": True,
     "path.simplify": True,
@@ -159,12 +147,11 @@ def shades(colour: str, n: int) -> tuple[str, ...]:
 def in_pixels(note: str = "") -> Generator[dict[str, bytes]]:
     """Also draw every picture made inside in pixels, with a `note` under it: yields PNGs by the pictures' names."""
     images: dict[str, bytes] = {}
-    pixels_token, note_token = _PIXELS.set(images), _NOTE.set(note)
+    token = _PIXELS.set((note, images))
     try:
         yield images
     finally:
-        _PIXELS.reset(pixels_token)
-        _NOTE.reset(note_token)
+        _PIXELS.reset(token)
 
 
 def rows_of(*columns: Array) -> tuple[tuple[Cell, ...], ...]:
@@ -177,7 +164,8 @@ def svg(picture: Sheet, name: str, title: str) -> str:
     """Return the picture as an SVG document, inside `look`; the same picture gives the same bytes."""
     if _SIMULATED.get():
         picture.figure.suptitle("SIMULATED", x=0.995, ha="right", fontsize=6.5, color=GREY, fontweight="bold")
-    if note := _NOTE.get():
+    note, images = _PIXELS.get() or ("", None)
+    if note:
         picture.figure.supxlabel(note, x=0.01, ha="left", fontsize=6.5, color=GREY, wrap=True)
     engine = picture.figure.get_layout_engine()
     if engine is not None:
@@ -188,7 +176,7 @@ def svg(picture: Sheet, name: str, title: str) -> str:
     buffer = io.StringIO()
     with mpl.rc_context({"svg.hashsalt": name}):
         picture.figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
-    if (images := _PIXELS.get()) is not None:
+    if images is not None:
         pixels = io.BytesIO()
         picture.figure.savefig(pixels, format="png", dpi=DOTS, facecolor="white", metadata={"Software": None})
         images[name] = pixels.getvalue()
