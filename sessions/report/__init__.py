@@ -63,7 +63,6 @@ def findings(
         unscored,
         title=f"{plan.protocol}, subject {plan.subject}" if plan.blocks else f"Recording {recording.folder.name}",
         head=_simulation_notice(recording, tables),
-        versions=facts.versions(),
         people=facts.people(recording, tables),
         apparatus=facts.apparatus(recording, analysis),
         excluded=(

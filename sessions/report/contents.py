@@ -1,8 +1,7 @@
 """Content of a report, ready for any export. Missing numbers have a reason."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
 
 from drivers.arrays import Array
 from sessions.plan.plan import Choice
@@ -17,16 +16,7 @@ from sessions.statistics.scores import MeanScore
 from sessions.strokes import Stroke
 from sessions.strokes.stroke import FIXED
 
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
-
 Numbers = tuple[float, ...]
-
-
-def same_fields(source: "DataclassInstance", target: "type[DataclassInstance]") -> dict[str, Any]:
-    """Return the values of a record's fields that another type of record also has, by name."""
-    names = {field.name for field in fields(source)} & {field.name for field in fields(target)}
-    return {name: getattr(source, name) for name in names}
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +157,6 @@ class Report:
     session: str
     head: str = ""  # first line of every document on a simulated session; "" for a real one
     sealed: str = ""  # whether predictions were sealed before scores
-    versions: tuple[Fact, ...] = ()
     people: tuple[Fact, ...] = ()
     apparatus: tuple[Fact, ...] = ()
     excluded: tuple[str, ...] = ()

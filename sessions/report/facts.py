@@ -11,7 +11,7 @@ from sessions.file_access import leaves
 from sessions.plan.plan import Block, Origin
 from sessions.prediction import SED, PredictionOptions, SessionPrediction, with_own_finger
 from sessions.prediction.afferent import AfferentSettings, usual_settings
-from sessions.recording.head import calibration_hash, software_versions
+from sessions.recording.head import calibration_hash
 from sessions.recording.manifest import file_sha256
 from sessions.recording.reader import Recording
 from sessions.recording.schema import LIVE_FILE
@@ -23,11 +23,6 @@ from sessions.strokes.analysis import Analysis
 from sessions.strokes.settings import AnalysisSettings
 from sessions.strokes.stroke import PLANNED_AT, AreaLaw
 from sessions.toml_file import toml_text
-
-
-def versions() -> tuple[Fact, ...]:
-    """Return the software versions of a page."""
-    return tuple(Fact(name, version) for name, version in software_versions().items())
 
 
 def session_commands(

@@ -18,9 +18,9 @@ from sessions.exchange.csv_text import write_rows
 from sessions.exchange.session_tables import heading
 from sessions.file_access import check_replaceable, remedy, write_whole
 from sessions.prediction import QUANTITIES, SED
+from sessions.recording.head import software_versions
 from sessions.report import study_prose
 from sessions.report.contents import Report
-from sessions.report.facts import versions
 from sessions.report.figures import Panel, Plate, plates
 from sessions.report.figures.relation import study_plates
 from sessions.report.figures.style import SVG_MARK
@@ -83,6 +83,7 @@ def _page(file: str, drawings: Iterable[Plate], notice: str, **values: object) -
         drawing=embed,
         text_address=text_address,
         csv_of=partial(panel_csv, notice=notice),
+        versions=software_versions(),
         **values,
     )
 
@@ -169,7 +170,6 @@ def study_page(study: StudyFindings, name: str) -> str:
         study=study,
         name=name,
         prose=study_prose,
-        versions=versions(),
         trials=sum(len(visit.rows) for visit in study.visits),
         trials_csv=trials_csv(study),
         columns_csv=columns_csv(study),

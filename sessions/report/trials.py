@@ -3,6 +3,7 @@
 import itertools
 import re
 from collections.abc import Mapping, Sequence, Set
+from dataclasses import fields as fields_of
 from dataclasses import replace
 from operator import itemgetter
 from typing import Any
@@ -13,6 +14,7 @@ from drivers.arrays import Array, Indices
 from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction
 from sessions.prediction.afferent import AfferentSettings, Firing, parameters
 from sessions.prediction.scenes import doubt_of
+from sessions.prediction.stored import TrialNumbers
 from sessions.recording.reader import Recording
 from sessions.report.contents import (
     AnswerFinding,
@@ -22,7 +24,6 @@ from sessions.report.contents import (
     PredictionFinding,
     StrokeFinding,
     Trace,
-    same_fields,
 )
 from sessions.report.wording import plural
 from sessions.statistics.scores import by_key
@@ -55,8 +56,13 @@ def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ..
             "within": stroke.number,
             "curve": None,
         }
-        findings.append(StrokeFinding(**{**same_fields(stroke, StrokeFinding), **numbers}))
+        findings.append(StrokeFinding(**_values(stroke, Stroke) | numbers))
     return tuple(findings)
+
+
+def _values(record: Stroke | TrialNumbers, form: type[Stroke | TrialNumbers]) -> dict[str, Any]:
+    """Return the values of a record's fields that are fields of `form`, by name."""
+    return {column.name: getattr(record, column.name) for column in fields_of(form)}
 
 
 def answers(recording: Recording) -> tuple[AnswerFinding, ...]:
@@ -241,7 +247,7 @@ def finding_of(row: TrialPrediction, firing: Firing | None = None) -> Prediction
     if firing is not None:
         numbers |= {"peak_rate": float(firing.rate.max()), "settled_rate": firing.settled_rate}
         numbers |= {"peak_rate_interval": firing.peak_interval, "settled_rate_interval": firing.settled_interval}
-    return PredictionFinding(**{**same_fields(row, PredictionFinding), **numbers})
+    return PredictionFinding(**_values(row, TrialNumbers) | numbers)
 
 
 def _row(row: TrialPrediction) -> dict[float, float]:

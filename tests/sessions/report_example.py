@@ -278,7 +278,6 @@ def _contents():
         "session": "P01-forces",
         "head": "SIMULATED: the transducer and the subject of this recording are simulated",
         "sealed": "Predictions were not sealed before the scores were given.",
-        "versions": (Fact("daq-app", "0.1.0"), Fact("numpy", "2.4.6")),
         "people": (Fact("subjects who scored", "10"),),
         "apparatus": (Fact("height of the face", "0 mm", "default, set by nobody"),),
         "excluded": ("Take 1 of trial 3 was discarded by the experimenter: slipped off.",),
