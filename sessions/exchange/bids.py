@@ -121,11 +121,11 @@ def _dataset(recording: Recording, dataset_type: str, software: Mapping[str, str
     }
 
 
-def _participants(recording: Recording, participant: str) -> Table:
+def _participants(recording: Recording, subject: str) -> Table:
     plan = recording.plan
     simulated = "subject" in (recording.simulated_sentence or "")
     columns = (
-        Column("participant_id", "", "BIDS label of the participant", (participant,)),
+        Column("participant_id", "", "BIDS label of the participant", (subject,)),
         Column("code", "", "code of the participant, never a name", (plan.subject,)),
         Column("stroking_hand", "", "hand that stroked; n/a: nobody stated it", (plan.stroking_hand,)),
         Column("answering_hand", "", "hand that answered; n/a: nobody stated it", (plan.answering_hand,)),
