@@ -92,8 +92,8 @@ def _other_response(state: AnalystState, prediction: PredictionFinding) -> list[
     response = response_kind.numbers(prediction)
     if response_kind.name == SED.name or not response:
         return []
-    value, *error = response
-    mesh = error[0] / abs(value) if error and value else None
+    value, error = response
+    mesh = error / abs(value) if error is not None and value else None
     condition_text, label = condition(state.report, prediction), tr(response_kind.label)
     name = tr("{response} {condition}, averaged over the ending", response=label, condition=condition_text)
     return [(name, response_kind.text(response_kind.factor * value) + errors_text(mesh))]
@@ -120,7 +120,7 @@ def greatest_errors(report: Report | None, response: str = SED.name) -> str:
     answers = [(prediction, value) for prediction in predictions if (value := response_kind.numbers(prediction))]
     if not answers:
         return ""
-    mesh = [value[1] / abs(value[0]) for _, value in answers if len(value) > 1 and value[0]]
+    mesh = [error / abs(value) for _, (value, error) in answers if error is not None and value]
     effect = _effect(report) if response == SED.name else ""
     errors = errors_text(max(mesh) if len(mesh) == len(answers) else None, effect)
     conditions = " / ".join(sorted({condition(report, prediction) for prediction, _ in answers}))

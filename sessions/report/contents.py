@@ -16,8 +16,6 @@ from sessions.statistics.scores import MeanScore
 from sessions.strokes import Stroke
 from sessions.strokes.stroke import FIXED
 
-Numbers = tuple[float, ...]
-
 
 @dataclass(frozen=True, slots=True)
 class Fact:

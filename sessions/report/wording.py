@@ -10,7 +10,7 @@ from typing import Literal
 
 from sessions.prediction import BY_NAME, SED
 from sessions.prediction.stored import Ends
-from sessions.report.contents import Numbers, PredictionFinding
+from sessions.report.contents import PredictionFinding
 from sessions.statistics.correlations import Relation
 from sessions.statistics.scores import bounds
 from sessions.strokes.stroke import digits, significant
@@ -197,17 +197,15 @@ class ShownResponse:
         """
         return digits(number, self.places) + ("" if self.unit == "1" else f" {self.unit}")
 
-    def numbers(self, prediction: PredictionFinding) -> Numbers | None:
-        """Return a prediction's number in the stored unit, and its error if known; None without a number."""
+    def numbers(self, prediction: PredictionFinding) -> tuple[float, float | None] | None:
+        """Return a prediction's number in the stored unit, and its error, None if unknown; None without a number."""
         if self.name == SED.name:
-            error = prediction.error_estimate
-            if prediction.sed is None:
-                return None
-            return (prediction.sed,) if error is None else (prediction.sed, abs(prediction.sed) * error)
+            sed, error = prediction.sed, prediction.error_estimate
+            return None if sed is None else (sed, None if error is None else abs(sed) * error)
         if self.name not in prediction.responses:
             return None
         value, error = prediction.responses[self.name]
-        return (value, error) if math.isfinite(error) else (value,)
+        return value, error if math.isfinite(error) else None
 
     def interval(self, prediction: PredictionFinding) -> Ends | None:
         """Return the 95 % interval of a prediction from friction, in the stored unit; None without one."""

@@ -146,8 +146,8 @@ def _draw(picture: Sheet, quantity: StrokeQuantity, curves: Sequence[tuple[Strok
         rows += [(stroke.number, stroke.index, t, v, int(within)) for t, v, within in points]
         if valid.any():
             last_valid = np.flatnonzero(valid & inside if (valid & inside).any() else valid)[-1]
-            point = float(trace.time[last_valid]), float(values[last_valid])
-            labels.append(Label(str(stroke.number if stroke.index is None else stroke.index), *point))
+            label = str(stroke.number if stroke.index is None else stroke.index)
+            labels.append((label, float(trace.time[last_valid]), float(values[last_valid])))
     axes.set(xlabel="time since contact onset [s]", xlim=(0.0, max((t for _, _, t, _, _ in rows), default=1.0)))
     if rows:  # from 0 where no value is negative
         heights = [row[3] for row in rows]
@@ -185,7 +185,7 @@ def response_panel(predictions: Sequence[PredictionFinding], name: str) -> Panel
             if history.time[-1] < last_time:  # settled: constant
                 plateau = [history.time[-1], last_time], [kilopascal[-1]] * 2
                 axes.plot(*plateau, color=shade, linewidth=0.8, linestyle=(0, (2, 2)))
-        labels.append(Label(label, last_time, float(kilopascal[-1])))
+        labels.append((label, last_time, float(kilopascal[-1])))
         course = zip(history.time.tolist(), history.sed_ending.tolist(), strict=True)
         rows += [(prediction.trial, prediction.index, *instant) for instant in course]
         sliding_values += kilopascal[history.time >= PRESS_DURATION].tolist()

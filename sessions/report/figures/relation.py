@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from sessions.prediction.stored import Ends
-from sessions.report.contents import Experiment, Numbers, PredictionFinding
+from sessions.report.contents import Experiment, PredictionFinding
 from sessions.report.figures.style import (
     GREEN,
     GREY,
@@ -163,7 +163,7 @@ def relation_panel(experiment: Experiment, predictions: Sequence[PredictionFindi
     header += (f"{quantity.label} [{quantity.kept_unit}]", f"error estimate of {quantity.label} [-]")
     interval = f"95 % interval of {quantity.label} by friction"
     header += (f"{interval}, low [{quantity.kept_unit}]", f"{interval}, high [{quantity.kept_unit}]")
-    relative = [n[1] / abs(n[0]) if len(n) > 1 and n[0] else None for _, n, _ in points]
+    relative = [None if error is None or not value else error / abs(value) for _, (value, error), _ in points]
     rows = (
         (m.index, m.mean, m.low, m.high, experiment.own_scores.get(m.index), n[0], error, *(friction or (None, None)))
         for (m, n, friction), error in zip(points, relative, strict=True)
@@ -192,7 +192,7 @@ def _on_line(relation: Relation, score: float) -> float:
 def _point(
     picture: Sheet,
     mean: MeanScore,
-    numbers: Numbers,
+    numbers: tuple[float, float | None],
     friction: Ends | None,
     quantity: ShownResponse,
     *,
@@ -201,11 +201,12 @@ def _point(
 ) -> None:
     """Draw one stimulus with its errors and its index on the side away from the line."""
     axes = picture.axes[0]
-    value = quantity.factor * numbers[0]
+    number, error = numbers
+    value = quantity.factor * number
     text = f"index {mean.index}: score {mean.mean:.1f}, {quantity.label} {quantity.text(value)}"
     if mean.low is not None and mean.high is not None:
         axes.plot([mean.low, mean.high], [value, value], color=GREY, linewidth=0.8, zorder=2)
-    mesh = [(numbers[0] - error, numbers[0] + error, 2.4) for error in numbers[1:]]
+    mesh = [] if error is None else [(number - error, number + error, 2.4)]
     for low, high, width in [*mesh, *([] if friction is None else [(*friction, 0.8)])]:
         limits = [quantity.factor * low, quantity.factor * high]
         axes.plot([mean.mean] * 2, limits, color=GREY, linewidth=width, zorder=2)

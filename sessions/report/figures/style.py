@@ -207,13 +207,7 @@ def _finish_svg(text: str, name: str, title: str, hover: Mapping[str, str]) -> s
 LABEL_X = 1.04  # where labels begin, in widths of the axes
 
 
-@dataclass(frozen=True, slots=True)
-class Label:
-    """A text at the right of a picture, and its point."""
-
-    text: str
-    x: float
-    y: float
+Label = tuple[str, float, float]  # a text at the right of a picture, and the x and y of its point
 
 
 def spread(targets: Sequence[float], gap: float, low: float, high: float) -> list[float]:
@@ -239,19 +233,20 @@ def label_right(picture: Sheet, axes: Axes, labels: Sequence[Label], heading: st
     if not labels:
         return
     write = partial(axes.text, transform=axes.get_yaxis_transform(), va="center", ha="left")
-    names = [write(LABEL_X, label.y, label.text, color=INK) for label in labels]
-    top = write(LABEL_X, labels[0].y, heading, color=GREY)
+    targets = [y for _, _, y in labels]
+    names = [write(LABEL_X, y, text, color=INK) for text, _, y in labels]
+    top = write(LABEL_X, targets[0], heading, color=GREY)
     lines = [axes.plot([], [], color=GREY, linewidth=0.4, clip_on=False, zorder=1)[0] for _ in labels]
 
     def place() -> None:
         height = axes.get_window_extent().height / picture.figure.dpi * 72  # [pt]
         (low, high), (low_x, high_x) = axes.get_ylim(), axes.get_xlim()
         gap = 1.3 * _TEXT * (high - low) / height
-        heights = spread([label.y for label in labels], gap, low, high - (gap if heading else 0.0))
+        heights = spread(targets, gap, low, high - (gap if heading else 0.0))
         line_end = low_x + (LABEL_X - 0.01) * (high_x - low_x)
-        for label, name, line, y in zip(labels, names, lines, heights, strict=True):
+        for (_, x, target), name, line, y in zip(labels, names, lines, heights, strict=True):
             name.set_y(y)
-            line.set_data([label.x, line_end], [label.y, y])
+            line.set_data([x, line_end], [target, y])
         top.set_y(max(heights) + gap)
 
     picture.after_layout.append(place)

@@ -131,8 +131,8 @@ def _response_cell(prediction: PredictionFinding, quantity: ShownResponse) -> Ce
     numbers = quantity.numbers(prediction)
     if not numbers:
         return number_cell(None, str, prediction.reasons.get("sed"))
-    value, error = (quantity.factor * number for number in (*numbers, 0.0)[:2])
-    return Cell(with_error(value, error, quantity.places))
+    value, error = numbers
+    return Cell(with_error(quantity.factor * value, quantity.factor * (error or 0.0), quantity.places))
 
 
 def variants_table(report: Report) -> Table | None:
