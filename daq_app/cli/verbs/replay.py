@@ -13,15 +13,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from daq_app.batch.derived import (
-    ANALYSIS,
-    PREDICTION,
-    changes,
-    decisions_of,
-    repeat,
-    stale_sentence,
-    stored_document,
-)
+from daq_app.batch import derived
+from daq_app.batch.derived import ANALYSIS, PREDICTION
 from daq_app.cli.options import add_session, number_in_range
 from daq_app.console import DONE, FLAWED, Console
 from sessions.recording import Recording
@@ -57,15 +50,15 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
         def compare(name: str, document: Mapping[str, Any]) -> list[str]:
             """Return the differences of a document made again with its own decisions; note it if others apply now."""
-            notes.extend(filter(None, [stale_sentence(name, document, decisions)]))
-            fresh = repeat(name, document, copy, decisions_of(document, decisions), recording)
-            return changes(name, document, fresh)
+            notes.extend(filter(None, [derived.stale_sentence(name, document, decisions)]))
+            fresh = derived.repeat(name, document, copy, derived.decisions_of(document, decisions), recording)
+            return derived.changes(name, document, fresh)
 
-        analysis = stored_document(options.session, ANALYSIS)
+        analysis = derived.stored_document(options.session, ANALYSIS)
         if analysis is None:
-            analysis = json.loads(json.dumps(repeat(ANALYSIS, {}, recording, decisions)))
+            analysis = json.loads(json.dumps(derived.repeat(ANALYSIS, {}, recording, decisions)))
         differences += compare(ANALYSIS, analysis)
-        prediction = None if options.no_prediction else stored_document(options.session, PREDICTION)
+        prediction = None if options.no_prediction else derived.stored_document(options.session, PREDICTION)
         if prediction is not None:
             console.progress(0.9, f"making {PREDICTION} again")
             differences += compare(PREDICTION, prediction)

@@ -17,16 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from daq_app.batch import sign_map
-from daq_app.batch.sensitivity import (
-    Index,
-    check_design,
-    constant_numbers,
-    doubts,
-    saltelli_points,
-    sensitivity,
-    usual_design,
-)
+from daq_app.batch import sensitivity, sign_map
 from daq_app.batch.sign_map import Answer
 from daq_app.cli.options import add_seed, add_shared
 from daq_app.console import DONE, Console, WrongValue, table
@@ -74,15 +65,16 @@ def run(options: argparse.Namespace, console: Console) -> int:
         raise WrongValue(f"--{option} is for many fingers, and a scene is one: leave out --{option} or the scene")
     scene = load_toml(options.scene, Scene)
     if options.design is None:
-        design, origin = usual_design(scene), "default: nobody set it"
+        design, origin = sensitivity.usual_design(scene), "default: nobody set it"
     else:
         file_name = str(options.design)
-        design, origin = check_design(tables_in(text_of(options.design), file_name), scene, file_name), "set"
+        ranges = tables_in(text_of(options.design), file_name)
+        design, origin = sensitivity.check_design(ranges, scene, file_name), "set"
     progress = console.counter("scenes", samples * (len(design) + 2))
-    indices, seds = sensitivity(scene, design, samples, options.seed, progress)
+    indices, seds = sensitivity.sensitivity(scene, design, samples, options.seed, progress)
     low, high = float(seds.min()), float(seds.max())
-    doubtful = doubts(indices, samples)
-    constant = constant_numbers(scene, design)
+    doubtful = sensitivity.doubts(indices, samples)
+    constant = sensitivity.constant_numbers(scene, design)
     console.result(
         samples=samples,
         seed=options.seed,
@@ -109,7 +101,7 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     label = QUANTITIES[column_index].label
     changes = sign_map.single_changes(options.kinematics)
     map_trials = sign_map.map_trials(options.kinematics)
-    points = saltelli_points(sign_map.DESIGN, samples, options.seed)
+    points = sensitivity.saltelli_points(sign_map.DESIGN, samples, options.seed)
     trials = [*changes.values(), *map_trials.values(), *sign_map.sample_fingers(points, options.kinematics)]
     try:
         progress = console.counter("fingers", len(trials))
@@ -150,7 +142,7 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     for name, (sobol, count) in indices.items():
         console.say(f"\nWhat affects the change of the {label} over {name} (Sobol indices, {count} fingers):")
         if sobol:
-            console.say(_index_table(sobol), *doubts(sobol, samples))
+            console.say(_index_table(sobol), *sensitivity.doubts(sobol, samples))
         else:
             console.say("too few complete blocks of the design have an answer: use more --samples")
     return DONE
@@ -221,7 +213,7 @@ def _print_thirds(name: str, points: Array, signs: Array, label: str, console: C
     console.say(f"The {label} keeps both signs, by {name}: {', '.join(texts)}.")
 
 
-def _index_table(indices: Sequence[Index]) -> str:
+def _index_table(indices: Sequence[sensitivity.Index]) -> str:
     rows: list[list[str]] = []
     for index in indices:
         pairs = (index.first, index.first_error), (index.total, index.total_error)
