@@ -6,7 +6,7 @@ Strokes are cut at valleys of the force and where the finger reverses.
 from collections import deque
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import sqrt
+from math import inf, sqrt
 from statistics import fmean, median
 from typing import NamedTuple
 
@@ -47,8 +47,7 @@ class ContactDetector:
         self._above: float | None = None  # first reading of the present run above the onset threshold
         self._below: float | None = None  # first reading of the present run below the lift threshold
         self._pull_start: float | None = None  # first reading of the present run far below zero
-        self._has_zero = False  # zero and noise were measured
-        self._level = self._noise_band = self._threshold = self._lift = 0.0
+        self._level, self._noise_band, self._threshold = 0.0, inf, inf  # without a zero there is no contact
         if noise is not None:
             self._take(0.0, noise)
 
@@ -58,17 +57,15 @@ class ContactDetector:
         return tuple(event for event in events if event is not None)
 
     def _take_reading(self, t: float, force: float) -> ContactEvent | None:
+        excess = force - self._level
         if self._touching:
-            return self._still_touching(t, force)
-        if self._has_zero:
-            excess = force - self._level
-            self._noise_exit = _since(self._noise_exit, t, holds=excess > self._noise_band)
-            self._above = _since(self._above, t, holds=excess > self._threshold)
-            if self._above is not None:
-                return self._touch(self._above, t)
-            if self._follows:
-                self._notice_pull(t, excess)
+            return self._still_touching(t, excess)
+        self._noise_exit = _since(self._noise_exit, t, holds=excess > self._noise_band)
+        self._above = _since(self._above, t, holds=excess > self._threshold)
+        if self._above is not None:
+            return self._touch(self._above, t)
         if self._follows:
+            self._notice_pull(t, excess)
             self._gather(t, force)
         return None
 
@@ -81,8 +78,8 @@ class ContactDetector:
         self._above = self._noise_exit = None
         return onset
 
-    def _still_touching(self, t: float, force: float) -> ContactEvent | None:
-        self._below = _since(self._below, t, holds=force - self._level < self._lift)
+    def _still_touching(self, t: float, excess: float) -> ContactEvent | None:
+        self._below = _since(self._below, t, holds=excess < self._settings.lift_fraction * self._threshold)
         if self._below is None or t - self._below < self._settings.lift_hold - _ROUNDING:
             return None
         lift = ContactEvent(touches=False, time=self._below, noticed=t)
@@ -95,7 +92,7 @@ class ContactDetector:
         """Forget a zero that was taken in contact."""
         self._pull_start = _since(self._pull_start, t, holds=excess < -self._threshold)
         if self._pull_start is not None and t - self._pull_start >= self._settings.baseline / 2:
-            self._pull_start, self._has_zero = None, False
+            self._pull_start, self._noise_band, self._threshold = None, inf, inf
             self._start_gathering()
 
     def _start_gathering(self) -> None:
@@ -116,10 +113,9 @@ class ContactDetector:
         self._bin.append(force)
 
     def _take(self, level: float, noise: float) -> None:
-        self._has_zero, self._level = True, level
+        self._level = level
         self._noise_band = self._settings.leave_noise * noise
         self._threshold = onset_threshold(noise, self._settings)
-        self._lift = self._settings.lift_fraction * self._threshold
 
 
 _ROUNDING = 1e-9  # times are sums of ticks [s]
