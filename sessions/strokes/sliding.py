@@ -145,10 +145,10 @@ def slide(findings: Findings, span: Span, track: Track, uncut: Track, interval: 
         limit = settings.slide.sliding_share * float(np.nanpercentile(track.speed, 90))
         sliding = np.where(track.speed >= limit, track.ratio, np.nan)
         window = steady_window(sliding, track.rate, len(track.time), settings)
-    motion, trouble = _speed(span, track, window)
-    if trouble is not None and interval is None:  # the centre of pressure does not show the slide
+    speed = _speed(span, track, window)
+    if not isinstance(speed, Movement) and interval is None:  # the centre of pressure does not show the slide
         window = steady_window(track.ratio, track.rate, len(track.time), settings)
-        motion, trouble = _speed(span, track, window)
+        speed = _speed(span, track, window)
     refusal = _refusal(span, track, uncut, window)
     if window is not None and refusal is not None and interval is not None:
         sentence = f"{refusal[1]} The window was decided by a person: its numbers are given."
@@ -164,14 +164,14 @@ def slide(findings: Findings, span: Span, track: Track, uncut: Track, interval: 
         findings.flaw(name, sentence, "refused", forbidden)
         return None
     findings.numbers["steady"] = (float(track.time[window.start]), float(track.time[window.stop - 1]))
-    if trouble is not None:
-        findings.flaw(trouble[0], trouble[1], "doubtful", SPEED)
-    elif motion is not None:
-        findings.numbers |= {"speed": motion.speed, "speed_error": motion.error}
-        _slide_onset(findings, track, motion)
-    _direction(findings, track, window, motion if trouble is None else None)
-    if trouble is None and motion is not None:
-        _side_load(findings, track, window, motion)
+    if isinstance(speed, Movement):
+        findings.numbers |= {"speed": speed.speed, "speed_error": speed.error}
+        _slide_onset(findings, track, speed)
+        _direction(findings, track, window, speed)
+        _side_load(findings, track, window, speed)
+    else:
+        findings.flaw(*speed, "doubtful", SPEED)
+        _direction(findings, track, window, None)
     return window
 
 
@@ -216,15 +216,15 @@ def _roll_flaw(track: Track, uncut: Track, level: float) -> tuple[FlawName, str]
     )
 
 
-def _speed(span: Span, track: Track, window: slice | None) -> tuple[Movement | None, tuple[FlawName, str] | None]:
-    """Return the movement over a window, and the flaw that withholds its speed, if any."""
+def _speed(span: Span, track: Track, window: slice | None) -> Movement | tuple[FlawName, str]:
+    """Return the movement over a window, or the flaw that withholds its speed."""
     name = FlawName.SPEED_NOT_MEASURABLE
     if window is None:
-        return None, (name, "")
+        return name, ""
     time, settings, limits = track.time[window], track.settings, track.settings.slide
     motion = movement(time, track.position[window], track.rate, settings)
     if motion is None:
-        return None, (name, "The centre of pressure is known at too few instants of the steady window for a speed.")
+        return name, "The centre of pressure is known at too few instants of the steady window for a speed."
     step = span.torque_step / float(np.nanmean(track.normal[window]))
     reason = ""
     if step > limits.speed_step * (motion.speed * float(time[-1] - time[0])):
@@ -234,18 +234,17 @@ def _speed(span: Span, track: Track, window: slice | None) -> tuple[Movement | N
     elif motion.explained < limits.speed_line:
         reason = f"A straight line explains {100 * motion.explained:.0f} % of the centre of pressure's movement"
     if reason:
-        return motion, (name, f"{reason}: no speed is given.")
+        return name, f"{reason}: no speed is given."
     if span.frame.height_origin == "default":
         arm = -track.wrench[window, :2] / track.normal[window, None]
         lever = movement(time, arm, track.rate, settings)
         height_error = limits.height_doubt * (lever.speed if lever else 0.0)
         if height_error > limits.speed_error * motion.speed:
-            return motion, (
-                FlawName.HEIGHT_UNKNOWN,
+            return FlawName.HEIGHT_UNKNOWN, (
                 f"Nobody stated the face's height: were it wrong by {limits.height_doubt:g} mm the speed of "
-                f"{motion.speed:.3g} mm/s would change by {height_error:.2g} mm/s, so none is given.",
+                f"{motion.speed:.3g} mm/s would change by {height_error:.2g} mm/s, so none is given."
             )
-    return motion, None
+    return motion
 
 
 def _slide_onset(findings: Findings, track: Track, motion: Movement) -> None:
