@@ -150,9 +150,8 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> SessionSetup
             raise NotNow("what was simulated at the beginning must be simulated again, and nothing else")
         writer = SessionWriter.open(folder, going_on, reserve=RESERVE)
     continuation = Continuation(resumption, resuming.resumed_data(gap, info, software_versions()), last)
-    return SessionSetup(
-        recording.plan, writer, going_on, people, info, going_on.offset_ns, continuation, tuple(recording.events)
-    )
+    earlier = tuple(recording.events)
+    return SessionSetup(recording.plan, writer, going_on, people, info, going_on.offset_ns, continuation, earlier)
 
 
 def run(prepared: SessionSetup, bench: Bench, display: Display, inbox: Inbox, send: Send) -> None:
@@ -194,9 +193,8 @@ def _recorded_people(recording: Recording) -> m.People:
     values = _recorded_settings(recording)
     with suppress(msgspec.DecodeError, msgspec.ValidationError):
         friction = msgspec.json.decode(values.get(SURFACE_FRICTION, "[]"))
-        return msgspec.convert(
-            {"kind": values["people"], "seed": values.get("people seed", 0), "friction": friction}, m.People
-        )
+        people = {"kind": values["people"], "seed": values.get("people seed", 0), "friction": friction}
+        return msgspec.convert(people, m.People)
     return m.People()
 
 

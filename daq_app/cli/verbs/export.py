@@ -35,9 +35,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     losses = list(recording.losses)
     console.result(folder=str(folder), files=[str(path) for path in files], losses=losses)
     size = sum(path.stat().st_size for path in files) / 1e6
-    console.say(
-        recording.simulated_sentence, *losses, f"{folder}: {len(files)} file{'s' * (len(files) > 1)}, {size:.1f} MB"
-    )
+    count = f"{len(files)} file{'s' * (len(files) > 1)}"
+    console.say(recording.simulated_sentence, *losses, f"{folder}: {count}, {size:.1f} MB")
     return FLAWED if losses else DONE
 
 

@@ -270,9 +270,8 @@ def _try_quota(folder: Path) -> dict[str, Any]:
     """
     clock = RealClock()
     calibration = Calibration("SELFTEST", "counts", np.eye(6), np.full(6, np.nan), "made up for the selftest")
-    info = TransducerInfo(
-        "selftest:", "selftest", "SIMULATED", "SELFTEST", True, float(_RATE), float(_RATE), calibration
-    )
+    rate = float(_RATE)
+    info = TransducerInfo("selftest:", "selftest", "SIMULATED", "SELFTEST", True, rate, rate, calibration)
     writer = _QuotaWriter.create(folder, _PLAN, info, provenance(clock), clock=clock, reserve=RESERVE)
     writer.limit(QUOTA)
     spans: list[float] = []

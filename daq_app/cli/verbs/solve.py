@@ -169,11 +169,10 @@ def _print_course(numbers: "CourseNumbers", errors: "CourseNumbers", console: Co
         (rates_title, numbers.rate, errors.rate, labels[len(_COURSE) :], "/s"),
     )
     for title, values, section_errors, names, per_second in sections:
+        columns = zip(names, values.T, section_errors.T, COURSE_UNITS[-len(names) :], strict=True)
         lines = [
             [name, *(_with_error(*pair, factor) for pair in zip(value, error, strict=True)), f"{unit}{per_second}"]
-            for name, value, error, (unit, factor) in zip(
-                names, values.T, section_errors.T, COURSE_UNITS[-len(names) :], strict=True
-            )
+            for name, value, error, (unit, factor) in columns
         ]
         console.say(f"\n{title}")
         console.say(table(lines, header=["", "press", "break-away", "slide", ""]).lstrip("\n"))
