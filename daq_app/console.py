@@ -17,7 +17,7 @@ from typing import Any, NoReturn, TextIO
 from solver.progress import listening
 
 DONE, FAILED, WRONG, FLAWED, STOPPED = 0, 1, 2, 3, 130  # exit codes
-OUR_OWN = ("daq_app", "drivers", "sessions", "simulators", "solver")  # packages
+_OUR_OWN = ("daq_app", "drivers", "sessions", "simulators", "solver")  # packages
 _COLUMNS = 80  # of a terminal that does not report its width
 _PATIENCE = 1.0  # before people want to see progress [s]
 
@@ -54,9 +54,9 @@ class NotWritten(Exception):
     """The output could not be written: why, where, and what to do."""
 
 
-def is_ours(error: Exception) -> bool:
-    """Say whether an error belongs to the program's own classes, whose messages are sentences for people."""
-    return type(error).__module__.partition(".")[0] in OUR_OWN
+def is_ours(module: str) -> bool:
+    """Say whether a module is the program's own; the messages of its exceptions are sentences for people."""
+    return module.partition(".")[0] in _OUR_OWN
 
 
 def accept_any_text(*streams: TextIO) -> None:

@@ -337,7 +337,7 @@ def sentence_of(error: Exception) -> str:
     """Return a sentence that describes a failure."""
     if isinstance(error, OSError):
         return failure_sentence(error)
-    return str(error) if is_ours(error) else f"{type(error).__name__}: {error}"
+    return str(error) if is_ours(type(error).__module__) else f"{type(error).__name__}: {error}"
 
 
 def _frame_mesh(sketch: Sketch) -> FrameMesh:

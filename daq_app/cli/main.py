@@ -10,7 +10,6 @@ from daq_app.console import (
     DONE,
     FAILED,
     FLAWED,
-    OUR_OWN,
     STOPPED,
     WRONG,
     Console,
@@ -154,7 +153,7 @@ def _failure(error: Exception) -> tuple[str, int]:
         sentence = f"{sentence[: _LONGEST // 2]} … {sentence[-_LONGEST // 2 :]}"
     if any(f"{base.__module__}.{base.__qualname__}" in _WRONG for base in type(error).__mro__):
         return sentence, WRONG
-    if sentence and is_ours(error):
+    if sentence and is_ours(type(error).__module__):
         return sentence, FAILED
     if isinstance(error, OSError):
         from sessions.file_access import failure_sentence  # here, because only a failing verb needs it
@@ -163,7 +162,7 @@ def _failure(error: Exception) -> tuple[str, int]:
     if isinstance(error, UnicodeEncodeError):  # Python holds non-UTF-8 bytes of a name as lone surrogates
         around = error.object[max(error.start - 40, 0) : error.end + 20]
         return f"a name is not UTF-8 ({around!r}): rename the file or folder and run this again", FAILED
-    if isinstance(error, ModuleNotFoundError) and error.name and error.name.partition(".")[0] not in OUR_OWN:
+    if isinstance(error, ModuleNotFoundError) and error.name and not is_ours(error.name):
         package = error.name.partition(".")[0]
         return f"the Python package {package} is not installed; 'pip install daq-app' installs it", FAILED
     return f"unexpected {type(error).__name__} ({sentence}); run again with --debug and report the output", FAILED

@@ -87,9 +87,9 @@ class Recorder:
         try:
             work()
         except Exception as error:  # noqa: BLE001  a bug must not end the recorder
-            error_name = type(error).__name__
-            sentence = " ".join(str(error).split()) if is_ours(error) else f"unexpected {error_name} ({error})"
-            self._send(m.Failed(name, sentence, error_name))
+            kind, from_us = type(error).__name__, is_ours(type(error).__module__)
+            sentence = " ".join(str(error).split()) if from_us else f"unexpected {kind} ({error})"
+            self._send(m.Failed(name, sentence, kind))
 
 
 if __name__ == "__main__":
