@@ -187,17 +187,15 @@ def displacement_log(path: Path) -> DisplacementLog:
             f"{path} needs a header with {_DISPLACEMENT} and one of {', '.join(CLOCKS)}, as readings.csv of an export "
             f"calls them; it has {', '.join(map(cell_text, names)) or 'none'}"
         )
-    positions = [names.index(name) for name in (clock, _DISPLACEMENT)]
-    width_position = names.index(_WIDTH) if _WIDTH in names else None
+    positions = [names.index(name) if name in names else None for name in (clock, _DISPLACEMENT, _WIDTH)]
     values: list[tuple[float, float, float]] = []
     for line, cells in rows:
-        time, displacement = (_number(cells, position) for position in positions)
+        time, displacement, width = (_number(cells, position) for position in positions)
         if not np.isfinite([time, displacement]).all():
             problem = f"{clock} or {_DISPLACEMENT} is no number; {mend_row(*cells)}"
             raise ImportRefused(f"{path}, line {line}: {problem}")
         if values and time <= values[-1][0]:
             raise ImportRefused(f"{path}, line {line}: {clock} does not grow; correct or remove the row")
-        width = np.nan if width_position is None else _number(cells, width_position)
         if width <= 0.0:
             raise ImportRefused(f"{path}, line {line}: {_WIDTH} is not above 0; leave the cell empty without a contact")
         values.append((time, displacement, width))
@@ -206,6 +204,6 @@ def displacement_log(path: Path) -> DisplacementLog:
     return DisplacementLog(clock, *np.array(values).T)
 
 
-def _number(cells: Sequence[str], position: int) -> float:
-    number = number_in(cells[position]) if position < len(cells) else None
+def _number(cells: Sequence[str], position: int | None) -> float:
+    number = number_in(cells[position]) if position is not None and position < len(cells) else None
     return np.nan if number is None else number

@@ -36,7 +36,7 @@ def session_commands(
 ) -> tuple[str, ...]:
     """Return the commands, for the folder of the sessions; `scores` are the names of further visits."""
     name = shlex.quote(recording.folder.name)
-    settings = (*area_arguments(analysis.settings.area), *calibration_arguments(analysis.settings.gain_error))
+    settings = analysis_arguments(analysis.settings.area, analysis.settings.gain_error)
     seed = analysis.settings.bootstrap_seed
     seed_option = ["--bootstrap-seed", str(seed)] if seed else []  # later verbs read it from the results of the first
     lines = [["verify", name], ["analyse", name, *settings, *seed_option]]
@@ -44,10 +44,9 @@ def session_commands(
     if prediction is not None:
         file = scene_file(recording, prediction)
         scene = [] if file is None else ["--scene", shlex.quote(file.name)]
-        variants = prediction.options.variants
-        variant_option = ["--variants", "both"] if variants == "both" else []
+        variants = ["--variants", "both"] if prediction.options.variants == "both" else []
         model, firing = model_arguments(prediction.options), _afferent_arguments(afferent)
-        lines.append(["predict", name, *model, *scene, *variant_option, *firing, *settings])
+        lines.append(["predict", name, *model, *scene, *variants, *firing, *settings])
     if paths is not None:
         small = sum(path.kinematics == "small" for path in PATHS)
         finite = any(len(values) > small for values in paths.values())
@@ -83,25 +82,17 @@ def model_arguments(options: PredictionOptions) -> list[str]:
     ]
 
 
-def area_arguments(law: AreaLaw) -> list[str]:
-    """Return the arguments for a law of the contact area.
+def analysis_arguments(law: AreaLaw, gain_error: float | None) -> list[str]:
+    """Return the arguments for a law of the contact area and a calibration error [-], which is typed in per cent.
 
-    >>> area_arguments(AreaLaw("power", 0.5, 3.0))
-    ['--area', '0.5', '--area-force', '3.0']
+    >>> analysis_arguments(AreaLaw("power", 0.5, 3.0), 0.003)
+    ['--area', '0.5', '--area-force', '3.0', '--calibration-error', '0.3']
     """
-    if law.law == "fixed":
-        return []
-    force = [] if law.force == PLANNED_AT else ["--area-force", repr(float(law.force))]
-    return ["--area", "hertz" if law.law == "hertz" else repr(float(law.exponent)), *force]
-
-
-def calibration_arguments(gain_error: float | None) -> list[str]:
-    """Return the arguments for a calibration error, in per cent.
-
-    >>> calibration_arguments(0.003)
-    ['--calibration-error', '0.3']
-    """
-    return [] if gain_error is None else ["--calibration-error", f"{100.0 * gain_error:.12g}"]
+    arguments: list[str] = []
+    if law.law != "fixed":
+        arguments += ["--area", "hertz" if law.law == "hertz" else repr(float(law.exponent))]
+        arguments += [] if law.force == PLANNED_AT else ["--area-force", repr(float(law.force))]
+    return arguments if gain_error is None else [*arguments, "--calibration-error", f"{100.0 * gain_error:.12g}"]
 
 
 def _afferent_arguments(settings: AfferentSettings | None) -> list[str]:

@@ -10,7 +10,7 @@ from itertools import chain
 from sessions.prediction import BY_NAME, SED
 from sessions.prediction.stored import UNKNOWNS
 from sessions.report.contents import Fact
-from sessions.report.facts import area_arguments, calibration_arguments, model_arguments
+from sessions.report.facts import analysis_arguments, model_arguments
 from sessions.report.prose import OTHER_FINGERS, friction_question
 from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.tables.scales import psychometric_sentences, scale_sentences, study_functions
@@ -284,7 +284,7 @@ def command(study: StudyFindings, name: str) -> str:
     arguments = ["daq-app", "study", shlex.quote(name)]
     if study.synthetic is not None:
         arguments = ["daq-app", "study", "--synthetic", str(study.synthetic), "--out", shlex.quote(name)]
-    arguments += [*model_arguments(model), *area_arguments(options.area), *calibration_arguments(options.gain_error)]
+    arguments += [*model_arguments(model), *analysis_arguments(options.area, options.gain_error)]
     arguments += [] if study.response == SED.name else ["--quantity", study.response]
     arguments += [] if model.intervals == usual else ["--intervals" if model.intervals else "--no-intervals"]
     arguments += {"none": [], "small": ["--paths"], "finite": ["--paths", "finite"]}[options.paths]

@@ -133,9 +133,10 @@ def relation_panel(experiment: Experiment, predictions: Sequence[PredictionFindi
     relation = experiment.score_relation
     rising = relation is not None and (relation.slope or 0.0) > 0.0
     values = [quantity.factor * numbers[0] for _, numbers, _ in points]
-    for (mean, numbers, friction), value in zip(points, values, strict=True):
+    for point, value in zip(points, values, strict=True):
+        mean = point[0]
         above = relation is None or value >= quantity.factor * _on_line(relation, mean.mean)
-        _point(picture, mean, numbers, friction, quantity, above=above, rising=rising)
+        _draw_point(picture, point, quantity, above=above, rising=rising)
         own_score = experiment.own_scores.get(mean.index)
         if own_score is not None:
             text = f"index {mean.index}: own score {own_score:.1f}, {quantity.label} {quantity.text(value)}"
@@ -189,19 +190,12 @@ def _on_line(relation: Relation, score: float) -> float:
     return relation.intercept + relation.slope * score
 
 
-def _point(
-    picture: Sheet,
-    mean: MeanScore,
-    numbers: tuple[float, float | None],
-    friction: Ends | None,
-    quantity: ShownResponse,
-    *,
-    above: bool,
-    rising: bool,
-) -> None:
+Point = tuple[MeanScore, tuple[float, float | None], Ends | None]  # score, number and its error, interval by friction
+
+
+def _draw_point(picture: Sheet, point: Point, quantity: ShownResponse, *, above: bool, rising: bool) -> None:
     """Draw one stimulus with its errors and its index on the side away from the line."""
-    axes = picture.axes[0]
-    number, error = numbers
+    axes, (mean, (number, error), friction) = picture.axes[0], point
     value = quantity.factor * number
     text = f"index {mean.index}: score {mean.mean:.1f}, {quantity.label} {quantity.text(value)}"
     if mean.low is not None and mean.high is not None:

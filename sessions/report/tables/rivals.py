@@ -98,14 +98,13 @@ def _verdict(name: str, model: str, rivals: Sequence[Rival]) -> str:
     clauses = [
         f"{_rival_names(sides[side])} {side} closely than the {model}" for side in ("more", "less") if sides[side]
     ]
-    sentence = (
-        f"the scores follow {' and '.join(clauses)} (p < 0.05 by Holm over {len(adjusted)} rivals)" if clauses else ""
-    )
+    sentences: list[str] = []
+    if clauses:
+        sentences.append(f"the scores follow {' and '.join(clauses)} (p < 0.05 by Holm over {len(adjusted)} rivals)")
     if sides["neither"]:
-        sentence += (
-            "; they" if sentence else "the scores"
-        ) + f" do not distinguish the {model} from {_rival_names(sides['neither'])}"
-    return f"On {name}, {sentence}."
+        subject = "they" if clauses else "the scores"
+        sentences.append(f"{subject} do not distinguish the {model} from {_rival_names(sides['neither'])}")
+    return f"On {name}, {'; '.join(sentences)}."
 
 
 def _row(rival: Rival, quantity: str) -> Row:
