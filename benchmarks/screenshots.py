@@ -110,7 +110,7 @@ def score_reports(trial: int, score: float) -> tuple[m.Report, ...]:
     return (log_line("scored", trial, score=score), log_line("take_kept", trial, take=1))
 
 
-TARED = m.Tared((0.008, -0.007, -0.061, 1.2, -0.4, 0.02), (0.0041,) * 3 + (0.052,) * 3, (0.0,) * 6, 7000, 1.0)
+TARED = m.Tared((0.008, -0.007, -0.061, 1.2, -0.4, 0.02), (0.0041,) * 3 + (0.052,) * 3, 7000, 1.0)
 OPEN = (m.Device(INFO, FRAME), health(), TARED)
 SIMULATED = "SIMULATED transducer and hand"
 BEGINNING = (m.SessionBegun(FOLDER, PLAN, "simulated hand", SIMULATED, 0), steps.AskBegin(), status(1))
