@@ -158,7 +158,7 @@ def _take(setting: str, folder: Path, session: Path | None) -> None:
     from PySide6.QtCore import QLocale, QSettings
     from PySide6.QtWidgets import QApplication
 
-    from daq_app.qt.tokens import DARK, LIGHT
+    from daq_app.qt.preferences import THEME, settings
 
     size, scale, theme, locale = setting.split("-")
     width, height = (round(int(length) / float(scale)) for length in size.split("x"))
@@ -166,13 +166,8 @@ def _take(setting: str, folder: Path, session: Path | None) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     QSettings.setDefaultFormat(QSettings.Format.IniFormat)
     QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, str(folder / "settings"))
-    application = QApplication([])
-    arguments = (
-        application,
-        (width, height),
-        DARK if theme == "dark" else LIGHT,
-        lambda name: folder / f"{name}-{setting}.png",
-    )
+    settings().setValue(THEME, theme)
+    arguments = QApplication([]), (width, height), lambda name: folder / f"{name}-{setting}.png"
     _Places(*arguments).picture_all()
     if session is not None:
         _Places(*arguments).review(session)
@@ -181,11 +176,11 @@ def _take(setting: str, folder: Path, session: Path | None) -> None:
 class _Places:
     """The window, taken to each of its places."""
 
-    def __init__(self, application, size, theme, path) -> None:  # noqa: ANN001
+    def __init__(self, application, size, path) -> None:  # noqa: ANN001
         from daq_app.qt.start import open_window
 
         self.application, self.path, self.recorder = application, path, PlayedRecorder()
-        self.window = open_window(application, lambda: self.recorder, theme)
+        self.window = open_window(application, lambda: self.recorder)
         self.subject = self.window.subject
         self.window.side.show = self.subject.show
         for widget in (self.window, self.subject):

@@ -111,7 +111,7 @@ class ZoomedPlot(pg.PlotWidget):
         for side in ("left", "bottom"):
             self.getPlotItem().getAxis(side).setStyle(showValues=visible)
 
-    def name_curves(self, curves: Sequence[Any], corner: tuple[float, float] = (0.5, 1.0)) -> None:
+    def name_curves(self, curves: Sequence[Any], corner: tuple[float, float]) -> None:
         """Add a legend of curves at `corner`, from 0, 0 at the top left to 1, 1."""
         if self._names is not None:
             self._names.scene().removeItem(self._names)

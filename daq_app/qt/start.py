@@ -132,14 +132,11 @@ def _collect_due() -> None:
 
 @_without_garbage_collection()
 def open_window(
-    application: "QApplication",
-    start: "Callable[[], Client] | None" = None,
-    theme: "Tokens | None" = None,
-    tablet: "TabletScreen | None" = None,
+    application: "QApplication", start: "Callable[[], Client] | None" = None, tablet: "TabletScreen | None" = None
 ) -> "MainWindow":
     """Return the experimenter's window while the simulated bench connects; `start` makes a recorder.
 
-    Without a `theme` the window follows the system's. With a `tablet` the subject's page is on it.
+    With a `tablet` the subject's page is on it.
     """
     from daq_app.recorder.client import Recorder
     from daq_app.recorder.messages import Connect
@@ -151,18 +148,16 @@ def open_window(
     from daq_app.qt.main_window import MainWindow
     from daq_app.qt.tokens import preferred_tokens
 
-    application.setQuitOnLastWindowClosed(False)
-    _apply_theme(application, theme or preferred_tokens())
-    bridge = Bridge(recorder, start or Recorder.start)
-    bridge.connecting(SIMULATED_BENCH)
-    window = MainWindow(bridge, tablet)
-
     def follow_theme() -> None:
         _apply_theme(application, preferred_tokens())
 
+    application.setQuitOnLastWindowClosed(False)
+    follow_theme()
+    bridge = Bridge(recorder, start or Recorder.start)
+    bridge.connecting(SIMULATED_BENCH)
+    window = MainWindow(bridge, tablet)
     window.theme_chosen.connect(follow_theme)
-    if theme is None:
-        application.styleHints().colorSchemeChanged.connect(follow_theme)
+    application.styleHints().colorSchemeChanged.connect(follow_theme)
 
     # Python keeps its hook until exit; a bridge kept by it would be disconnected there, which crashes PySide.
     report = WeakMethod(bridge.report_drawing_failure)
