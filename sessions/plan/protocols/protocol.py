@@ -316,13 +316,12 @@ class Protocol:
             check(has_texts, "translations", language, f'the texts of {block} are missing in "{language}"')
 
     def _check_order(self, key: str, block: BlockOutline) -> None:
-        if self.order.constrained and (self.order.rule == "williams" or self.scale.answer == "choice"):
-            reason = (
-                "a Williams design fixes its orders" if self.order.rule == "williams" else "pairs are in no such order"
-            )
-            raise NotAllowed("order.rule", self.order.rule, f"{reason}: leave the other keys of [order] out")
-        if self.order.rule == "williams" and self.scale.answer == "choice":
-            raise NotAllowed("order.rule", self.order.rule, 'pairs are "shuffled"')
+        rule, by_pairs = self.order.rule, self.scale.answer == "choice"
+        if self.order.constrained and (rule == "williams" or by_pairs):
+            reason = "a Williams design fixes its orders" if rule == "williams" else "pairs are in no such order"
+            raise NotAllowed("order.rule", rule, f"{reason}: leave the other keys of [order] out")
+        if rule == "williams" and by_pairs:
+            raise NotAllowed("order.rule", rule, 'pairs are "shuffled"')
         if self.order.first_differs and block.repetitions > len(set(block.indices) - set(self.order.not_first)):
             reason = "more repetitions than stimuli that may be first, and first_differs asks for another each time"
             raise NotAllowed(f"{key}.repetitions", block.repetitions, reason)
