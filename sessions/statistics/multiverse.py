@@ -12,20 +12,9 @@ from itertools import product
 
 import numpy as np
 
-from sessions.prediction import (
-    QUANTITIES,
-    SED,
-    Friction,
-    Kinematics,
-    Nearby,
-    Prediction,
-    Progress,
-    Quantity,
-    Scene,
-    SessionPrediction,
-    part_of,
-)
-from sessions.prediction.scenes import scenes_of, settled_predictions, slides
+from sessions.prediction import QUANTITIES, SED, Friction, Nearby, Prediction, Quantity, Scene, SessionPrediction
+from sessions.prediction.options import Kinematics
+from sessions.prediction.scenes import Progress, part_of, scenes_of, settled_predictions, slides
 from sessions.recording import Recording
 from sessions.statistics.correlations import pearson
 from sessions.statistics.scores import by_key, surface_means

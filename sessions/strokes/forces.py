@@ -174,3 +174,9 @@ def friction_ratio(wrench: Array, floor: float) -> Array:
     normal = -wrench[:, 2]
     load = np.where(normal >= floor, normal, np.nan)
     return np.hypot(wrench[:, 0], wrench[:, 1]) / load
+
+
+def mean_vector(vectors: Array) -> Array:
+    """Return the mean (k,) of vectors (n, k), leaving out nan; nan without any."""
+    finite = vectors[np.isfinite(vectors).all(axis=1)]
+    return np.asarray(finite.mean(axis=0) if len(finite) else np.full(vectors.shape[1], np.nan), np.float64)

@@ -5,8 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from drivers.arrays import Array, Indices, Mask
+from sessions.strokes.forces import mean_vector
 from sessions.strokes.settings import AnalysisSettings, Pair, SteadySettings
-from sessions.strokes.span import Span, Track, mean_vector
+from sessions.strokes.span import Span, Track
 from sessions.strokes.stroke import COEFFICIENTS, DIRECTION, SPEED, Findings, FlawName, significant
 
 _QUARTERS = 4

@@ -247,12 +247,6 @@ def track_of(span: Span, contact: Contact, zero: StrokeZero) -> Track:
     return Track(*columns, floor, span.rate, span.settings)
 
 
-def mean_vector(vectors: Array) -> Array:
-    """Return the mean (k,) of vectors (n, k), leaving out nan; nan without any."""
-    finite = vectors[np.isfinite(vectors).all(axis=1)]
-    return np.asarray(finite.mean(axis=0) if len(finite) else np.full(vectors.shape[1], np.nan), np.float64)
-
-
 def _speed(time: Array, position: Array, span: Span) -> Array:
     """Return the speed (n,) [mm/s] of a position (n, 2) [mm], filtered within each unbroken stretch."""
     speed = np.full(len(time), np.nan)

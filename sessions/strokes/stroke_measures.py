@@ -6,18 +6,10 @@ from drivers.arrays import Array
 from sessions.plan.plan import PROXIMAL_TO_DISTAL, SessionPlan, Trial
 from sessions.strokes.contacts import Contact
 from sessions.strokes.decisions import StrokeDecisions
+from sessions.strokes.forces import mean_vector
 from sessions.strokes.settings import ZeroSettings
 from sessions.strokes.sliding import slide
-from sessions.strokes.span import (
-    Span,
-    StrokeZero,
-    Track,
-    curve_of,
-    mean_vector,
-    noise_of_ratio,
-    track_of,
-    unfiltered_forces,
-)
+from sessions.strokes.span import Span, StrokeZero, Track, curve_of, noise_of_ratio, track_of, unfiltered_forces
 from sessions.strokes.stick import break_away, power_of_normal_force, stick_slip
 from sessions.strokes.stroke import (
     COEFFICIENTS,
