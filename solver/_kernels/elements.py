@@ -3,15 +3,7 @@
 import numpy as np
 
 from solver._kernels import compile_loop, subroutine
-from solver.arrays import (
-    NEO_HOOKEAN,
-    Array,
-    BodyState,
-    ElementArrays,
-    ElementSystem,
-    ElementWork,
-    Narrow,
-)
+from solver.arrays import NEO_HOOKEAN, Array, BodyState, ElementArrays, ElementSystem, ElementWork, Narrow
 
 
 @subroutine

@@ -192,7 +192,7 @@ def _move_edges(
     x = np.ascontiguousarray(state.skin_positions(newton.condensed)[:, 0])
     edges = np.flatnonzero(np.diff(state.state)).tolist()
     reuse = newton.condensed.equilibrium is state.u  # the last iteration's tangent is still in memory
-    solvable = newton.linearise(state, state.load, x, 0, forces, reuse=reuse)
+    solvable = newton.linearise(state, x, 0, forces, reuse=reuse)
     is_single = np.count_nonzero(state.touching) == 1
     return [
         [
@@ -214,7 +214,7 @@ def _move_edge(
     states, senses = state.state.copy(), state.sense.copy()
     states[node], senses[node] = states[neighbour], senses[neighbour]
     start = replace(state, state=states, sense=senses)
-    if newton.solve_contact(start, state.load, x, 0, forces) == SINGULAR:
+    if newton.solve_contact(start, x, 0, forces) == SINGULAR:
         return None
     after = newton.correct(start, lambda _load: x)[0]
     return replace(after, state=states, sense=senses)  # the prescribed states, not those that would follow

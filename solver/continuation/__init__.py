@@ -248,7 +248,7 @@ class Continuation:
 
     def _tangent(self, state: EquilibriumState) -> _Tangent:
         newton = self.body.newton
-        newton.linearise(state, state.load, newton.skin_x)
+        newton.linearise(state, newton.skin_x)
         direction = newton.steps[:, self.parameter] / self.unit
         size = float(np.sqrt(direction @ direction + 1.0))
         return _Tangent(direction / size, 1.0 / size)
@@ -256,19 +256,19 @@ class Continuation:
     def _arc_step(self, start: _Point, tangent: _Tangent, length: float) -> EquilibriumState | None:
         """Return the state a step of `length` along the branch; None where the corrector fails."""
         newton, (direction, rate), unit = self.body.newton, tangent, self.unit
-        state, load = start.state, start.state.load
+        state = start.state
         total = np.zeros(len(newton.steps))
         for _ in range(BRANCH.max_corrections):
-            if not newton.linearise(state, load, newton.skin_x):
+            if not newton.linearise(state, newton.skin_x):
                 return None
             to, along = newton.steps[:, EQUILIBRIUM] / unit, newton.steps[:, self.parameter] / unit
-            current = self._value(load)
+            current = self._value(state.load)
             ahead = float(direction @ along) + rate
             if ahead == 0.0:
                 return None
             change = (length - float(direction @ (total + to)) - rate * (current - start.value)) / ahead
             step = to + change * along
-            load = self._with_value(load, current + change)
+            load = self._with_value(state.load, current + change)
             state, largest, changes = newton.apply_step(state, load, step * unit, newton.skin_x)
             total = total + step
             if not largest < newton.length_scale:

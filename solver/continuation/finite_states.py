@@ -179,7 +179,7 @@ def _at_force(newton: Newton, start: EquilibriumState, force: float) -> Equilibr
         state = load_stepping.solve_full_slip(newton, state.load._replace(depth=depth), state)
         if abs(state.force[1] / force - 1.0) < FORCE_SEARCH.force_tolerance:
             return state
-        if not newton.linearise(state, state.load, newton.skin_x):
+        if not newton.linearise(state, newton.skin_x):
             break
         stiffness = float(newton.force_changes(newton.steps)[1, BY_DEPTH])
         if not stiffness > 0.0:

@@ -12,8 +12,6 @@ from functools import cache
 from math import log2, sqrt
 from typing import Any
 
-import numpy as np
-
 from solver.arrays import Array
 from solver.contact import LoadState
 from solver.equilibrium import EquilibriumState, Newton
@@ -229,9 +227,7 @@ def remove_round_off(
     about, recover = finger.body.linearise_about(displacement)
     newton = Newton(about)
     try:
-        correction = newton.solve_linear(
-            replace(state, u=np.zeros_like(state.u)), state.load, newton.skin_x, forces_of(scene, state.load)
-        )
+        correction = newton.solve_linear(state, newton.skin_x, forces_of(scene, state.load))
     except ContactLost:
         return state, displacement
     return replace(correction, u=state.u + correction.u, iterations=state.iterations), recover(correction.u)

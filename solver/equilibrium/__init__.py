@@ -158,7 +158,6 @@ class Newton:
     def linearise(
         self,
         state: EquilibriumState,
-        load: LoadState,
         anchor: Array,
         rounds: int = 0,
         forces: ForceLoad | None = None,
@@ -175,11 +174,9 @@ class Newton:
         body = self.condensed
         if not body.linearise(state.u, None if reuse else state.pressure):
             return False
-        return self.solve_contact(state, load, anchor, rounds, forces) != SINGULAR
+        return self.solve_contact(state, anchor, rounds, forces) != SINGULAR
 
-    def solve_contact(
-        self, state: EquilibriumState, load: LoadState, anchor: Array, rounds: int, forces: ForceLoad | None = None
-    ) -> int:
+    def solve_contact(self, state: EquilibriumState, anchor: Array, rounds: int, forces: ForceLoad | None) -> int:
         """Solve the contact of the linearised body at `state`; return the result of `solve_active_set`."""
         body = self.condensed
         self._states.state[:], self._states.sense[:] = state.state, state.sense
@@ -189,8 +186,8 @@ class Newton:
             kind = PUSH_CONTROL if forces.tangential is None else DRAG_CONTROL
             drag, push = forces.tangential or 0.0, forces.normal
         return self._active_set(
-            self.arrays(), body.compliance, self.skin, self._states, load_arguments(load),
-            self._position(state.u, load, anchor),
+            self.arrays(), body.compliance, self.skin, self._states, load_arguments(state.load),
+            self._position(state.u, state.load, anchor),
             ContactControl(kind, float(drag), float(push), max_increment, rounds),
         )  # fmt: skip
 
@@ -214,7 +211,7 @@ class Newton:
         Touching nodes stay on the surface, and sticking nodes do not move. Friction forces are constant.
         """
         body, x = self.condensed, np.ascontiguousarray(state.skin_positions(self.condensed)[:, 0])
-        if not self.linearise(state, state.load, x, reuse=body.equilibrium is state.u) or not body.definite:
+        if not self.linearise(state, x, reuse=body.equilibrium is state.u) or not body.definite:
             return False
         free = np.column_stack([state.state != STICK, ~state.touching])
         free &= (body.held[:, None] & [HELD_X, HELD_Y]) == 0
@@ -276,11 +273,11 @@ class Newton:
             begin = replace(begin, load=begin.load._replace(travel=forces.travel))
         anchor = start.anchor(self.condensed)
         if self.condensed.constant:
-            return self.solve_linear(begin, begin.load, anchor(begin.load), forces)
+            return self.solve_linear(begin, anchor(begin.load), forces)
         rounds = CONTROL.max_rounds if forces is None else 0  # more rounds lose drags near the friction limit
 
         def linearise(state: EquilibriumState, *, reuse: bool = False) -> bool:
-            return self.linearise(state, state.load, anchor(state.load), rounds, forces, reuse=reuse)
+            return self.linearise(state, anchor(state.load), rounds, forces, reuse=reuse)
 
         return self._iterate(begin, linearise, anchor, termination)
 
@@ -328,12 +325,7 @@ class Newton:
         raise NotConverged(f"no equilibrium within {termination.max_iterations} iterations")
 
     def solve_linear(
-        self,
-        state: EquilibriumState,
-        load: LoadState,
-        anchor: Array,
-        forces: ForceLoad | None = None,
-        rounds: int | None = None,
+        self, state: EquilibriumState, anchor: Array, forces: ForceLoad | None = None, rounds: int | None = None
     ) -> EquilibriumState:
         """Return the equilibrium of a body of constant stiffness; the search for contact states begins at `state`.
 
@@ -342,14 +334,14 @@ class Newton:
         self.systems += 1
         self.condensed.linearise(self._rest, None)  # any state is one step away
         rounds = CONTROL.max_systems + 4 * len(self.skin_x) if rounds is None else rounds
-        count = self.solve_contact(replace(state, u=self._rest), load, anchor, rounds, forces)
+        count = self.solve_contact(replace(state, u=self._rest), anchor, rounds, forces)
         if count == SINGULAR:
             raise ContactLost("the touching points have no unique forces")
         if count == UNSETTLED:
             raise ContactLost(f"the states of the touching points still contradicted each other after {rounds} systems")
         u = self.steps[:, EQUILIBRIUM].reshape(-1, 2).copy()
         deeper, along = self.system.motion.tolist()
-        load = load._replace(depth=load.depth + deeper, travel=load.travel + along)
+        load = state.load._replace(depth=state.load.depth + deeper, travel=state.load.travel + along)
         iterations = state.iterations + count
         contact = self._states
         return EquilibriumState(

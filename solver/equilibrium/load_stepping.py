@@ -274,11 +274,11 @@ def slide_from_guess(
 
     Under a normal `force` [N/mm] the depth is unknown. Raises ContactLost, at the latest after `rounds` systems.
     """
-    start = EquilibriumState.undeformed(newton.condensed)
+    start = EquilibriumState.undeformed(newton.condensed, load)
     states = guess.astype(np.int32)
     begin = replace(start, state=states, sense=np.full(len(states), load.sense, np.int32))
     forces = None if force is None else ForceLoad(force, None)
-    return newton.solve_linear(begin, load, newton.skin_x, forces, rounds)
+    return newton.solve_linear(begin, newton.skin_x, forces, rounds)
 
 
 def slide_under(newton: Newton, load: LoadState, force: float, deepest: float | None = None) -> EquilibriumState:

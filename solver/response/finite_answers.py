@@ -300,7 +300,7 @@ def _correct(
     `newton` belongs to the finger, or to its relaxing tissues; `checks` are the audits of `state`.
     """
     x = state.skin_positions(newton.condensed)[:, 0]
-    if not newton.linearise(state, state.load, x):
+    if not newton.linearise(state, x):
         return None
     corrected = newton.correct(state, lambda _load: x)[0]
     corrected = replace(corrected, state=state.state, sense=state.sense)  # nanometres change no contact state

@@ -67,7 +67,7 @@ def skin_derivatives(newton: Newton, state: EquilibriumState) -> Array:
     load, size = state.load, len(state.state)
     if load.sense == 0 or (state.state == STICK).any():
         raise ValueError("a state with sticking points depends on its load path, which its tangent does not know")
-    if not newton.linearise(state, load, newton.skin_x):
+    if not newton.linearise(state, newton.skin_x):
         raise ValueError("the state has no tangent")
     x = np.ascontiguousarray(state.skin_positions(newton.condensed)[:, 0])
     position = SkinPosition(x, np.zeros(size), x)  # on the surface, with sticking nodes at their anchors

@@ -7,6 +7,7 @@ its residual.
 """
 
 from abc import ABC, abstractmethod
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import isfinite
 
@@ -116,12 +117,10 @@ class SmallStepper(Stepper):
             start = lower_onto_surface(self.newton.condensed, start)
         forces = ForceLoad(normal, None, start.load.travel) if slides else ForceLoad(normal, tangential)
         x = start.u[:, 0] + self.newton.skin_x
-        try:
-            state = self.newton.solve_linear(start, start.load, x, forces, _MAX_SYSTEMS)
-        except ContactLost:
-            self.reset()
-            return float("nan")
-        if state.reaches_end:
+        state = None
+        with suppress(ContactLost):
+            state = self.newton.solve_linear(start, x, forces, _MAX_SYSTEMS)
+        if state is None or state.reaches_end:
             self.reset()
             return float("nan")
         self.state = state
@@ -220,7 +219,7 @@ class FiniteStepper(Stepper):
             far, turns = _CONTROL.catch_up_step, _CONTROL.max_catch_up_iterations
         for number in range(1, max(iterations, turns) + 1):
             reuse = large_step and number == 1
-            regular = newton.linearise(state, state.load, anchor(state.load), 0, forces, reuse=reuse)
+            regular = newton.linearise(state, anchor(state.load), 0, forces, reuse=reuse)
             correction = newton.correct(state, anchor) if regular else None
             if reuse and (correction is None or correction[1] > _CONTROL.divergence * scale):
                 continue

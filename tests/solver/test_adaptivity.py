@@ -41,7 +41,7 @@ def test_the_adjoint_says_what_a_force_inside_the_finger_changes(scene):
             load[node, along] = step
             body, recover = finger.body.with_loads(load)
             newton = Newton(body)
-            assert newton.linearise(state, state.load, newton.skin_x + state.u[:, 0])
+            assert newton.linearise(state, newton.skin_x + state.u[:, 0])
             displaced = state.u + newton.steps[:, 0].reshape(-1, 2)
             change = (finger.sed_ending(recover(displaced)) - finger.sed_ending(displacement)) / step
             assert change == pytest.approx(dual[node, along], rel=1e-4, abs=1e-4 * np.abs(dual).max())

@@ -81,8 +81,9 @@ def solve_sticking(part):
     mesh, loads = loaded_block(0.48, part * MU * PRESSURE, 1)
     body = LinearBody.of(mesh, [Hooke(0.08, 0.48)], loads, free=("x", "y", "turn"))
     newton = Newton(body.condensed)
-    start = replace(EquilibriumState.undeformed(body.condensed), state=np.full(len(mesh.skin), STICK, np.int32))
-    return body, newton.solve_linear(start, LoadState(0.0, MU), newton.skin_x)
+    start = EquilibriumState.undeformed(body.condensed, LoadState(0.0, MU))
+    start = replace(start, state=np.full(len(mesh.skin), STICK, np.int32))
+    return body, newton.solve_linear(start, newton.skin_x)
 
 
 @pytest.mark.parametrize("part", [0.0, 0.1, 0.5, 0.9, 0.999999])

@@ -121,7 +121,7 @@ def test_the_sed_follows_an_edge_of_contact_by_a_parabola_about_a_place_within_h
         finger = LinearFinger.of(sample, Sizing(8.0, expected_depth(sample), margin=4.0))
         state, newton = nearest_state(sample, finger), finger.newton
         x = np.ascontiguousarray(state.skin_positions(newton.condensed)[:, 0])
-        newton.linearise(state, state.load, x, 0, None)
+        newton.linearise(state, x, 0, None)
 
         def sed_change(edge, nodes, state=state, newton=newton, x=x, finger=finger):
             contact, sense = state.state.copy(), state.sense.copy()
@@ -132,7 +132,7 @@ def test_the_sed_follows_an_edge_of_contact_by_a_parabola_about_a_place_within_h
             )
             contact[moved_nodes], sense[moved_nodes] = contact[source], sense[source]
             guess = replace(state, state=contact, sense=sense)
-            assert newton.solve_contact(guess, state.load, x, 0, None) >= 0
+            assert newton.solve_contact(guess, x, 0, None) >= 0
             new_state = newton.apply_step(guess, state.load, newton.steps[:, EQUILIBRIUM].copy(), x)[0]
             return finger.numbers([new_state])[0, 0] - finger.numbers([state])[0, 0]
 
