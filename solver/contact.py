@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
+from solver._kernels.contact_system import SHEAR_LIMITED_MU
 from solver.arrays import Array
 from solver.body.validation import finite
 
@@ -87,6 +88,11 @@ class LoadState(NamedTuple):
     def path_dependent(self) -> bool:
         """Whether a state depends on its load path: friction on each node then opposes the node's last motion."""
         return self.sense == 0 and not self.frictionless
+
+    @property
+    def mostly_shear_limited(self) -> bool:
+        """Whether mu is so large that nearly all skin in contact is shear-limited."""
+        return self.mu > SHEAR_LIMITED_MU and self.tau < np.inf
 
     def towards(self, target: "LoadState", part: float) -> "LoadState":
         """Return the load state a `part` of the way to `target`; a bound that is new applies in full."""

@@ -13,18 +13,11 @@ from solver.body.validation import check_loads
 from solver.constitutive import Law
 from solver.contact import ForceLoad, LoadState
 from solver.continuation import LARGEST_MU, Continuation, critical_stretch, jumped_branch
-from solver.continuation.existence import (
-    BEYOND_LIMIT,
-    is_mostly_shear_limited,
-    is_on_branch,
-    slide_from_limited_skin,
-    slide_on_branch,
-)
-from solver.continuation.limit_point import ContinuationLimit, depth_limit
+from solver.continuation.existence import BEYOND_LIMIT, ContinuationLimit, depth_limit, is_on_branch, slide_on_branch
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, Newton, Termination, load_stepping
 from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import march_scene, slide_or_hold
-from solver.equilibrium.load_stepping import sliding_load, solve_under_forces
+from solver.equilibrium.load_stepping import slide_from_limited_skin, sliding_load, solve_under_forces
 from solver.failures import NoSteadyState, NotConverged
 from solver.progress import report_progress
 from solver.scene import Scene
@@ -131,7 +124,7 @@ def _sliding_under(
     """Return full slip under the normal force of a scene, from `start` or by a growing force."""
     newton = finger.newton
     load = sliding_load(scene)
-    at_bound = is_mostly_shear_limited(load)
+    at_bound = load.mostly_shear_limited
     if start is not None:
         near = replace(start, load=load._replace(depth=start.load.depth, travel=start.load.travel))
         with suppress(NotConverged):
@@ -192,7 +185,7 @@ def _at_force(newton: Newton, start: EquilibriumState, force: float) -> Equilibr
 def _slide_deeper(finger: FiniteFinger, state: EquilibriumState, force: float) -> EquilibriumState:
     """Return full slip under `force` [N/mm] deeper than `state`, beyond which force control failed.
 
-    `limit_point` finds the largest depth and its force. Where a slightly deeper state exists nevertheless, the search
+    `depth_limit` finds the largest depth and its force. Where a slightly deeper state exists nevertheless, the search
     continues from this state. Raises as `settled_state`.
     """
     proof = depth_limit(finger.scene, state.load._replace(depth=FORCE_SEARCH.depth_factor * state.load.depth))

@@ -248,6 +248,19 @@ def solve_full_slip(
     return state
 
 
+def slide_from_limited_skin(
+    newton: Newton, load: LoadState, tolerance: float = TO_ROUND_OFF.tolerance
+) -> EquilibriumState:
+    """Return full slip from the frictionless state, with all its contact shear-limited under a growing bound.
+
+    Under a low bound and a large mu, skin is shear-limited even at small pressures, so that slip is a bad first guess.
+    Raises NotConverged.
+    """
+    frictionless = solve_full_slip(newton, load._replace(mu=0.0), None, tolerance)
+    state = np.where(frictionless.touching, SHEAR_LIMITED, OPEN).astype(frictionless.state.dtype)
+    return solve_full_slip(newton, load, replace(frictionless, state=state, load=load._replace(tau=0.0)), tolerance)
+
+
 def _linear_slide(newton: Newton, load: LoadState, start: EquilibriumState | None) -> EquilibriumState:
     """Return full slip of a body of constant stiffness in one step. Raises ContactLost.
 

@@ -9,9 +9,8 @@ from solver.accuracy import audits, order_of
 from solver.accuracy.adaptivity import choose_steps, steps_of_press, with_shares
 from solver.accuracy.error_estimate import NO_NESTED_STATE, NestedState, Steps, edge_changes, nested_state
 from solver.arrays import Array
-from solver.continuation.existence import limit_warnings, refuse_far_beyond
+from solver.continuation.existence import is_folded, is_sound, limit_warnings, refuse_far_beyond
 from solver.continuation.finite_states import rough_state, settled_state, slide_near
-from solver.continuation.limit_point import is_folded, is_sound
 from solver.continuation.small_states import check_depth
 from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.finger import FiniteFinger

@@ -20,7 +20,7 @@ from solver.body import Patches
 from solver.body.finite import IMAGINARY
 from solver.contact import STATE_NAMES, ForceLoad, LoadState
 from solver.continuation import jumped_branch
-from solver.continuation.limit_point import is_sound
+from solver.continuation.existence import is_sound
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, Newton, Termination, load_arguments
 from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger
 from solver.equilibrium.load_stepping import slide_from_guess, sliding_load, solve_full_slip, solve_under_forces

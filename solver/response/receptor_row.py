@@ -15,8 +15,8 @@ from solver.body import Patches
 from solver.body.finite import FiniteBody, FinitePatches
 from solver.body.linear import Elastic, LinearPatches
 from solver.body.receptor import endings
+from solver.continuation.existence import is_sound
 from solver.continuation.finite_states import rough_state
-from solver.continuation.limit_point import is_sound
 from solver.continuation.small_states import WIDE_MARGIN, expected_depth, nearest_state, state_on_branch
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger, finite_laws, settled_moduli

@@ -21,7 +21,7 @@ from solver import (
     SolveFailure,
     solve,
 )
-from solver.continuation import existence, finite_states, limit_point
+from solver.continuation import existence, finite_states
 from solver.equilibrium import load_stepping
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
@@ -285,7 +285,7 @@ def test_a_limit_under_a_force_has_a_slide_a_little_less_deep_and_none_a_little_
 def test_a_largest_depth_that_has_a_slide_beyond_it_is_no_limit_under_a_force(monkeypatch):
     """Simulated: the force is lost while it grows, and the branch seems to end at two thirds of the depth."""
     press = Scene(friction=Friction(0.3), loading=Loading(normal_force=0.1), solve=Solve("finite", tolerance=COARSE))
-    expected, depth_limit, march = solve(press), limit_point.depth_limit, load_stepping.march
+    expected, depth_limit, march = solve(press), existence.depth_limit, load_stepping.march
 
     def end_too_early(scene, load):
         depth = expected.indentation / 1.5

@@ -9,7 +9,7 @@ from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState
 from solver.body.finite import FiniteBody
 from solver.constitutive import NeoHooke, Ogden
 from solver.contact import LoadState
-from solver.continuation import BRANCH, Continuation, critical_stretch, existence, finite_states, limit_point
+from solver.continuation import BRANCH, Continuation, critical_stretch, existence, finite_states
 from solver.equilibrium import BY_FRICTION, Newton
 from solver.equilibrium.finger import FiniteFinger, finite_laws
 from solver.equilibrium.load_stepping import solve_full_slip
@@ -37,7 +37,7 @@ def squeezed_scene(depth, angle, tissues):
     [pytest.param(1.0, 0.987, marks=SLOW), (1.5, 0.609), (2.0, 0.373), pytest.param(2.5, 0.233, marks=SLOW)],
 )
 def test_friction_has_the_limit_that_several_meshes_and_orders_of_another_code_found(depth, largest):
-    reach = limit_point.friction_limit(
+    reach = existence.friction_limit(
         Scene(friction=Friction(0.0), loading=Loading(depth)), LoadState(depth, 0.0, np.inf, TOWARDS_TIP), 2.0
     )
     assert reach.ends_early
@@ -55,7 +55,7 @@ def test_friction_has_the_limit_that_several_meshes_and_orders_of_another_code_f
 )
 def test_depth_has_the_limit_that_another_code_found(mu, tau, largest):
     scene = Scene(friction=Friction(mu), loading=Loading(2.0))
-    reach = limit_point.depth_limit(scene, LoadState(2.0, mu, tau, TOWARDS_TIP))
+    reach = existence.depth_limit(scene, LoadState(2.0, mu, tau, TOWARDS_TIP))
     assert reach.ends_early
     assert reach.value == pytest.approx(largest, rel=0.03)
 
@@ -67,13 +67,13 @@ def test_where_skin_folds_at_one_place_both_limits_are_those_of_a_mesh_of_half_t
 ):
     scene = squeezed_scene(depth, angle, tissues)
     load = LoadState(depth, 0.85, np.inf, TOWARDS_TIP)
-    mu, deepest = limit_point.friction_limit(scene, load, 2.0), limit_point.depth_limit(scene, load)
-    monkeypatch.setattr(limit_point, "FINENESS", 2.0 * limit_point.FINENESS)
+    mu, deepest = existence.friction_limit(scene, load, 2.0), existence.depth_limit(scene, load)
+    monkeypatch.setattr(existence, "FINENESS", 2.0 * existence.FINENESS)
     monkeypatch.setattr(mesher, "FOLD", tuple(size / 2.0 for size in mesher.FOLD))
     finer = squeezed_scene(depth + 1e-9, angle, tissues)  # what was answered is not asked again
     load = load._replace(depth=depth + 1e-9)
-    assert mu.value == pytest.approx(limit_point.friction_limit(finer, load, 2.0).value, rel=0.015)
-    assert deepest.value == pytest.approx(limit_point.depth_limit(finer, load).value, rel=0.01)
+    assert mu.value == pytest.approx(existence.friction_limit(finer, load, 2.0).value, rel=0.015)
+    assert deepest.value == pytest.approx(existence.depth_limit(finer, load).value, rel=0.01)
 
 
 def test_a_branch_that_reaches_what_was_asked_for_is_the_direct_answer():
@@ -92,7 +92,7 @@ def test_a_branch_that_reaches_what_was_asked_for_is_the_direct_answer():
 def test_every_friction_beyond_the_end_of_a_branch_has_the_same_limit():
     scene, load = Scene(friction=Friction(0.0), loading=Loading(2.2)), LoadState(2.2, 0.0, np.inf, TOWARDS_TIP)
     targets = (1.1, 0.33, 0.7)  # in pieces of the branch that are traced one after another
-    assert len({limit_point.friction_limit(scene, load, target).value for target in targets}) == 1
+    assert len({existence.friction_limit(scene, load, target).value for target in targets}) == 1
 
 
 @pytest.mark.parametrize("exponent", [None, 2.0])
@@ -139,8 +139,8 @@ def test_what_is_crushed_beside_a_rigid_core_is_reported_as_not_known_whatever_t
 def test_no_limit_of_friction_is_reported_where_growing_depth_arrives_beyond_it(monkeypatch):
     scene = Scene(friction=Friction(0.6), loading=Loading(2.0, "-x"), solve=Solve("finite"))
     load = LoadState(2.0, 0.6, np.inf, TOWARDS_TIP)
-    search = limit_point.BranchSearch(scene, load, BY_FRICTION, load.mu)
-    branch_end = limit_point.ContinuationLimit(
+    search = existence.BranchSearch(scene, load, BY_FRICTION, load.mu)
+    branch_end = existence.ContinuationLimit(
         search, 0.373, ends_early=True, corrector_failed=False, least_stretch=0.55, numbers=np.ones(3)
     )
 
