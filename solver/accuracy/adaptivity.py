@@ -21,7 +21,7 @@ import numpy as np
 
 from solver._kernels import OPEN, SLIP, STICK
 from solver.accuracy import richardson_factor
-from solver.accuracy.error_estimate import PARTS, NestedState, Steps, edge_share, errors
+from solver.accuracy.error_estimate import NO_NESTED_STATE, PARTS, Steps, edge_share, errors
 from solver.arrays import Array, Indices
 from solver.body import Patches
 from solver.body.linear import Elastic
@@ -32,7 +32,7 @@ from solver.equilibrium.load_path import end_of_path
 from solver.failures import NotConverged
 from solver.mesh import ALONG, OUT, Lines, line
 from solver.mesh.mesher import FINEST, FingerMesh
-from solver.prediction import NestedNumbers
+from solver.prediction import COUNT, NestedNumbers
 from solver.scene import Scene
 
 MAX_UNKNOWNS = 25_000  # of a mesh: its nested mesh has 100,000, solved in 1 s at small strain and in 4 s at finite
@@ -126,16 +126,27 @@ def adjoint(finger: LinearFinger, displacement: Array, state: EquilibriumState) 
     return recover((free + compliance[:, forces] @ reactions).reshape(-1, 2))
 
 
-def with_shares(
-    scene: Scene, numbers: Array, on_nested: NestedState | NotConverged, steps: Steps | None
+def nested_numbers(
+    scene: Scene,
+    numbers: Array,
+    finger: Finger[Any],
+    state: EquilibriumState,
+    values: Array,
+    changes: Array,
+    steps: Steps | None,
+    order: float,
 ) -> NestedNumbers | NotConverged:
     """Return the results of a nested state, with the shares of columns and rows where a finer mesh may be needed.
 
-    `numbers` (COUNT,) are the scene's results on the mesh of the answer. A failure is returned unchanged.
+    `numbers` (COUNT,) are the scene's results on the mesh of the answer. `values` (COUNT + r,) and `changes` (m, COUNT
+    + r) come from `edge_changes` at the `state` of the nested `finger`. `steps` are its load steps where it depends on
+    its load path, and `order` is its `order_of`. Returns NO_NESTED_STATE where no equilibrium exists with an edge
+    moved, as at a friction limit.
     """
-    if isinstance(on_nested, NotConverged):
-        return on_nested
-    nested, finger, state = on_nested
+    if np.isinf(changes).any():
+        return NO_NESTED_STATE
+    results = values[:COUNT] if steps is None else steps.extrapolate(values[:COUNT])
+    nested = NestedNumbers(results, changes[:, :COUNT], values[COUNT:], changes[:, COUNT:], order)
     target = scene.solve.target
     misses_tolerance = target is not None and errors(scene, numbers, nested, steps).error_estimate > target
     if not misses_tolerance and scene.solve.contrast_tolerance is None:

@@ -27,10 +27,8 @@ import numpy as np
 from solver._kernels.active_set import SINGULAR
 from solver.accuracy import ORDER, richardson_factor
 from solver.arrays import Array
-from solver.body import Patches
 from solver.contact import ForceLoad
 from solver.equilibrium import EquilibriumState, Newton
-from solver.equilibrium.finger import Finger
 from solver.failures import NotConverged
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction, Response, percent
 from solver.quantities import NAMES
@@ -157,29 +155,6 @@ def edge_changes(
 
 
 NO_NESTED_STATE = NotConverged("the nested mesh has no such state: ask for less friction or depth")
-
-
-class NestedState(NamedTuple):
-    """A scene on its nested mesh."""
-
-    numbers: NestedNumbers
-    finger: Finger[Patches]
-    state: EquilibriumState
-
-
-def nested_state(
-    finger: Finger[Patches], state: EquilibriumState, values: Array, changes: Array, steps: Steps | None, order: float
-) -> NestedState | NotConverged:
-    """Return a state of the nested mesh with its results, from `values` (COUNT + r,) and `changes` (m, COUNT + r).
-
-    `steps` are its load steps where it depends on its load path, and `order` is its `order_of`. Returns NO_NESTED_STATE
-    where no equilibrium exists with an edge moved, as at a friction limit.
-    """
-    if np.isinf(changes).any():
-        return NO_NESTED_STATE
-    numbers = values[:COUNT] if steps is None else steps.extrapolate(values[:COUNT])
-    nested = NestedNumbers(numbers, changes[:, :COUNT], values[COUNT:], changes[:, COUNT:], order)
-    return NestedState(nested, finger, state)
 
 
 def _move_edges(

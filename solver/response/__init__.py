@@ -166,7 +166,7 @@ class Meshing(ABC):
 
 
 def complete_audits(
-    scene: Scene, finger: Finger[Patches], solution: SceneSolution, newton: Newton, settled_sed: Callable[[], float]
+    finger: Finger[Patches], solution: SceneSolution, newton: Newton, settled_sed: Callable[[], float]
 ) -> None:
     """Complete the audits of a state and of its load path. Raises SolveFailure where they fail.
 
@@ -176,7 +176,7 @@ def complete_audits(
     checks, state, path = solution.audits, solution.state, solution.path
     audits.refuse_unsound(checks, state.load.depth)
     audits.refuse_beyond_finger(finger, state, solution.displacement)
-    checks |= audits.force_residuals(scene, float(state.force[1]), float(state.force[0]))
+    checks |= audits.force_residuals(solution.scene, float(state.force[1]), float(state.force[0]))
     if path is None:
         return
     relaxing = path.tissue is not None

@@ -6,8 +6,8 @@ from functools import partial
 from time import perf_counter
 
 from solver.accuracy import audits, order_of
-from solver.accuracy.adaptivity import choose_steps, steps_of_press, with_shares
-from solver.accuracy.error_estimate import NO_NESTED_STATE, NestedState, Steps, edge_changes, nested_state
+from solver.accuracy.adaptivity import choose_steps, nested_numbers, steps_of_press
+from solver.accuracy.error_estimate import NO_NESTED_STATE, Steps, edge_changes
 from solver.arrays import Array
 from solver.continuation.existence import is_folded, is_sound, limit_warnings, refuse_far_beyond
 from solver.continuation.finite_states import rough_state, settled_state, slide_near
@@ -20,7 +20,7 @@ from solver.equilibrium.relaxation import CondensedRelaxing
 from solver.failures import WRINKLES, Folds, NoSteadyState, NotConverged, SolveFailure
 from solver.mesh import Fineness, Lines
 from solver.mesh.mesher import Sizing
-from solver.prediction import Prediction
+from solver.prediction import NestedNumbers, Prediction
 from solver.progress import check_stop, report_progress
 from solver.response import (
     FIRST_FINENESS,
@@ -186,11 +186,12 @@ def solution_on(
 
 
 def solve_nested(
-    scene: Scene, top: MeshSolution, steps: Steps | None, meshes: Meshes
-) -> tuple[NestedState | NotConverged, Steps | None]:
-    """Return the state of a scene on the nested mesh of `top`, or the reason for no estimate, and its load steps.
+    scene: Scene, top: MeshSolution, numbers: Array, steps: Steps | None, meshes: Meshes
+) -> tuple[NestedNumbers | NotConverged, Steps | None]:
+    """Return the results of a scene on the nested mesh of `top`, or the reason for no estimate, and its load steps.
 
-    `steps` are the load steps taken where the state depends on its load path. Raises Cancelled.
+    `numbers` (COUNT,) are the results on the mesh of `top`, and `steps` the load steps taken where the state depends on
+    its load path. Raises Cancelled.
     """
     if not top.finger.newton.is_stable(top.state):
         return Folds(WRINKLES), steps
@@ -212,7 +213,7 @@ def solve_nested(
         return NO_NESTED_STATE, steps
     forces = None if scene.viscoelastic else forces_of(scene, state.load)
     (values,), (changes,) = edge_changes(finger.newton, [(state, forces)], finger.numbers_and_row)
-    return nested_state(finger, state, values, changes, steps, order), steps
+    return nested_numbers(scene, numbers, finger, state, values, changes, steps, order), steps
 
 
 FINITE_IMBALANCE = 1e-8  # relative residual of the forces from which a state is corrected further [-]
@@ -278,17 +279,16 @@ def _predict(scene: Scene, fineness: Fineness, coarse: MeshSolution, meshes: Mes
     correct = partial(_correct, finger, newton)
     state, checks = audits.balance(state, checks, FINITE_IMBALANCE, correct)
     solution = SceneSolution(scene, state, state.u, checks, steps, path)
-    complete_audits(scene, finger, solution, newton, lambda: finger.sed_ending(top.state.u))
+    complete_audits(finger, solution, newton, lambda: finger.sed_ending(top.state.u))
     numbers = finger.all_numbers([state])[0]
     solved_at = perf_counter()
     report_progress("estimating errors, on the nested mesh")
-    on_nested, steps = solve_nested(scene, top, steps, meshes)
-    nested_numbers = with_shares(scene, numbers, on_nested, steps)
+    on_nested, steps = solve_nested(scene, top, numbers, steps, meshes)
     row = finger.row.average(state.u)
     estimate_s = perf_counter() - solved_at
     wall = solved_at - start - setup
     solution = replace(solution, steps=steps, warnings=limit_warnings(finger, state), wall_s=wall, setup_s=setup)
-    return prediction(solution, finger, numbers, row, nested_numbers, estimate_s)
+    return prediction(solution, finger, numbers, row, on_nested, estimate_s)
 
 
 def _correct(

@@ -11,8 +11,8 @@ from time import perf_counter
 import numpy as np
 
 from solver.accuracy import audits, order_of
-from solver.accuracy.adaptivity import choose_steps, steps_of_press, with_shares
-from solver.accuracy.error_estimate import NO_NESTED_STATE, Steps, edge_changes, nested_state
+from solver.accuracy.adaptivity import choose_steps, nested_numbers, steps_of_press
+from solver.accuracy.error_estimate import NO_NESTED_STATE, Steps, edge_changes
 from solver.arrays import Array
 from solver.continuation.small_states import (
     WIDE_MARGIN,
@@ -144,7 +144,7 @@ class SmallMeshing(Meshing):
         direct_solve = path is None and scene.normal_force is None and not state.load.path_dependent
         (state, displacement), checks = _remove_round_off(scene, finger, (state, displacement), always=direct_solve)
         solution = SceneSolution(scene, state, displacement, checks, steps, path)
-        complete_audits(scene, finger, solution, finger.newton, lambda: finger.sed_ending(finger.displacement(steady)))
+        complete_audits(finger, solution, finger.newton, lambda: finger.sed_ending(finger.displacement(steady)))
         unstable = UNSTABLE if is_unstable_under_force(scene, finger, state) else ""
         warnings = tuple(filter(None, [audits.inside_out_warning(checks), unstable]))
         return replace(solution, warnings=warnings, wall_s=perf_counter() - start + finger.solve_s / count)
@@ -207,6 +207,8 @@ def nested_numbers_of_all(
         values, changes = edge_changes(mesh.newton, with_forces, mesh.numbers_and_row)
         for (number, state), value, change in zip(states.items(), values, changes, strict=True):
             solution = solutions[number]
-            on_nested = nested_state(mesh, state, value, change, solution.steps, order_of(mesh, state))
-            out[number] = with_shares(solution.scene, numbers[number], on_nested, solution.steps)
+            order = order_of(mesh, state)
+            out[number] = nested_numbers(
+                solution.scene, numbers[number], mesh, state, value, change, solution.steps, order
+            )
     return out

@@ -7,6 +7,7 @@ its residual.
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import isfinite
@@ -19,7 +20,7 @@ from solver.body import Endings, Patches, Probes
 from solver.contact import ForceLoad, LoadState
 from solver.continuation.small_states import expected_depth
 from solver.equilibrium import BY_DEPTH, EquilibriumState, lower_onto_surface
-from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger
+from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger
 from solver.failures import ContactLost
 from solver.mesh.mesher import Sizing
 from solver.scene import Scene
@@ -303,12 +304,8 @@ def stepper(scene: Scene) -> Stepper:
     """
     kind = scene.solve.kinematics
     sizing = Sizing(_FINENESS[kind], expected_depth(scene), margin=MARGIN[kind])
-    mu, tau = float(scene.friction.mu), scene.friction.cap
-    follower: Stepper
-    if kind == "finite":
-        follower = FiniteStepper(FiniteFinger.of(scene, sizing), mu, tau)
-    else:
-        follower = SmallStepper(LinearFinger.of(scene, sizing), mu, tau)
+    steppers: dict[str, Callable[..., Stepper]] = {"small": SmallStepper, "finite": FiniteStepper}
+    follower = steppers[kind](KINDS[kind].of(scene, sizing), float(scene.friction.mu), scene.friction.cap)
     follower.step(1e-3, 0.0)  # compiles or loads the kernels
     follower.reset()
     return follower
