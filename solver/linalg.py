@@ -76,15 +76,11 @@ def _bisect(centres: Array, most: int) -> _Tree:
     return _Tree(order, low, high, children, level, parent, np.repeat(leaf, (high - low)[leaf]))
 
 
-class _FrontUnknowns(NamedTuple):
-    """The unknowns of every part, as ascending pairs: the part times the number of all unknowns, plus the unknown."""
+def _assign_unknowns(tree: _Tree, elements: Indices, free: Flags, interface: Indices) -> tuple[Indices, Indices]:
+    """Return the unknowns that every part eliminates, and those that it passes on, as ascending pairs.
 
-    inner: Indices  # of a part and an unknown that it eliminates
-    border: Indices  # of a part and an unknown that it passes on
-
-
-def _assign_unknowns(tree: _Tree, elements: Indices, free: Flags, interface: Indices) -> _FrontUnknowns:
-    """Return the unknowns of every part; `elements` (e, n) hold unknowns, in the order of `tree`.
+    A pair is the part times the number of all unknowns, plus the unknown. `elements` (e, n) hold unknowns, in the order
+    of `tree`.
 
     Unknowns that are not `free` have zero displacement and take no part. Those in `interface` are never eliminated.
     """
@@ -106,7 +102,7 @@ def _assign_unknowns(tree: _Tree, elements: Indices, free: Flags, interface: Ind
         inner.append(pairs[complete])
         border.append(pairs[~complete])
     border[-1] = (len(tree.low) - 1) * size + interface
-    return _FrontUnknowns(np.sort(np.concatenate(inner)), np.sort(np.concatenate(border)))
+    return np.sort(np.concatenate(inner)), np.sort(np.concatenate(border))
 
 
 _SIDES = ((0, -1), (1, 0), (0, 1), (-1, 0))  # steps across the four sides of an element
@@ -161,15 +157,15 @@ def _plan(count: int, *numbers: bytes) -> SymbolicFactorization:
     tree = _bisect(places(elements), _LEAF)
     free = np.ones(2 * count, bool)
     free[fixed] = False
-    unknowns = _assign_unknowns(tree, raw[tree.order], free, skin)
+    inner_pairs, border_pairs = _assign_unknowns(tree, raw[tree.order], free, skin)
     parts = len(tree.low)
-    part, eliminated = np.divmod(unknowns.inner, len(free))
+    part, eliminated = np.divmod(inner_pairs, len(free))
     inner = np.bincount(part, minlength=parts)
     start = np.cumsum(inner) - inner
     number = np.full(2 * count, -1)
     sequence = np.concatenate([eliminated, skin])
     number[sequence] = np.arange(len(sequence))
-    owner, passed_on = np.divmod(unknowns.border, len(free))
+    owner, passed_on = np.divmod(border_pairs, len(free))
     keys = np.sort(owner * len(sequence) + number[passed_on])  # borders part by part, each in ascending order
     owner, entry = np.divmod(keys, len(sequence))
     border = np.bincount(owner, minlength=parts)

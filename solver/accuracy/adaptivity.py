@@ -155,7 +155,7 @@ def nested_numbers(
     change = abs(float(nested.numbers[0] - numbers[0]))
     parts *= richardson_factor(nested.order) * change / max(float(parts.sum()), np.finfo(float).tiny)
     edge = np.flatnonzero(np.diff(state.state))  # node before each edge of contact
-    middle = (finger.arcs[edge] + finger.arcs[edge + 1]) / 2.0
+    middle = (finger.geometry.skin_arcs[edge] + finger.geometry.skin_arcs[edge + 1]) / 2.0
     columns = np.searchsorted(finger.geometry.lines.arcs, middle) - 1
     np.add.at(parts, columns, edge_share(nested.order) * nested.edge_changes[:, 0])
     whole = float(parts.sum())

@@ -140,12 +140,7 @@ class Finger(ABC, Generic[PatchKind]):
     def contact_width(self, state: EquilibriumState) -> float:
         """Return the width of the contact along the surface [mm]."""
         x = state.skin_positions(self.newton.condensed)[:, 0]
-        return width(self.arcs, x, state.normal, state.touching)
-
-    @cached_property
-    def arcs(self) -> Array:
-        """Arc positions (k,) of the nodes that may touch [mm]."""
-        return self.geometry.skin_arcs
+        return width(self.geometry.skin_arcs, x, state.normal, state.touching)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,9 +177,7 @@ class LinearFinger(Finger[LinearPatches]):
         """Return whether skin touches outside the part that may, so that this part must be larger."""
         skin = self.geometry.all_skin
         below = self.geometry.mesh.nodes[skin, 1] + displacement[skin, 1] < state.load.depth * (1.0 - 1e-9)
-        may = np.zeros(len(displacement), bool)
-        may[self.geometry.mesh.skin] = True
-        may = may[skin]
+        may = np.isin(skin, self.geometry.mesh.skin)
         ends = bool(state.touching[0] and not may[0]) or bool(state.touching[-1] and not may[-1])
         return ends or bool((below & ~may).any())
 

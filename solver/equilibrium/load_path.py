@@ -257,24 +257,18 @@ def apply_loading(
 ) -> None:
     """Append the press, and the slides or the drag. Raises as `march_scene`."""
     press = loading.depth if loading.normal_force is None else loading.normal_force
-    share = 1.0 if loading.dragged else 0.5  # of the work, for progress
-    count = steps.press_steps * (2 if loading.dragged else 1)
-    doing = "pressing and dragging step by step" + _reason(path)
-    for number in range(1, steps.press_steps + 1):
-        part = number / steps.press_steps
-        path.advance_to(LoadPoint(PRESSING_TIME * part, press * part, 0.0))
-        report(doing, share * number / count)
+    parts = [number / steps.press_steps for number in range(1, steps.press_steps + 1)]
+    points = [LoadPoint(PRESSING_TIME * part, press * part, 0.0) for part in parts]
+    share = 0.5  # of the work, for progress
     if loading.tangential_force is not None:
-        load = -loading.direction * loading.tangential_force
-        for number in range(1, steps.press_steps + 1):
-            part = number / steps.press_steps
-            path.advance_to(LoadPoint(PRESSING_TIME + DRAGGING_TIME * part, press, load * part))
-            report(doing, share * (steps.press_steps + number) / count)
-        return
-    for direction in loading.directions:
-        _slide(
-            path, direction * loading.speed, steps, _settling_criterion(path, finger, direction, step_factor), report
-        )
+        load, share = -loading.direction * loading.tangential_force, 1.0
+        points += [LoadPoint(PRESSING_TIME + DRAGGING_TIME * part, press, load * part) for part in parts]
+    for number, point in enumerate(points, 1):
+        path.advance_to(point)
+        report("pressing and dragging step by step" + _reason(path), share * number / len(points))
+    for direction in () if loading.dragged else loading.directions:
+        settled = _settling_criterion(path, finger, direction, step_factor)
+        _slide(path, direction * loading.speed, steps, settled, report)
 
 
 def _reason(path: LoadPath) -> str:

@@ -7,7 +7,7 @@ a depth below the skin. In the world frame the surface is y = 0 with the finger 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from math import ceil, cos, pi, radians, sin
 from typing import Self
@@ -162,7 +162,7 @@ class Sizing:
     halved: bool = False  # whether every element is divided in four
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)  # without slots, for a cached property
 class FingerMesh:
     """The mesh of a finger, with its lines."""
 
@@ -176,7 +176,7 @@ class FingerMesh:
     all_skin: Indices  # (2 a + 1,) nodes of the whole skin, including those that may not touch
     away_from_held: NDArray[np.bool_]  # (a,) elements along the skin that are not close to held skin
 
-    @property
+    @cached_property
     def skin_arcs(self) -> Array:
         """Arc positions (k,) of the nodes that may touch [mm]."""
         return with_middles(self.arcs)[np.searchsorted(self.all_skin, self.mesh.skin)]
