@@ -177,7 +177,9 @@ class LinearFinger(Finger[LinearPatches]):
         """Return whether skin touches outside the part that may, so that this part must be larger."""
         skin = self.geometry.all_skin
         below = self.geometry.mesh.nodes[skin, 1] + displacement[skin, 1] < state.load.depth * (1.0 - 1e-9)
-        may = np.isin(skin, self.geometry.mesh.skin)
+        may = np.zeros(len(displacement), bool)
+        may[self.geometry.mesh.skin] = True
+        may = may[skin]
         ends = bool(state.touching[0] and not may[0]) or bool(state.touching[-1] and not may[-1])
         return ends or bool((below & ~may).any())
 
