@@ -19,30 +19,7 @@ from daq_app.recorder.messages import SessionEnded
 from sessions.plan.protocols.planning import plan
 from sessions.plan.protocols.protocol import protocol
 from sessions.recording import Recording
-from sessions.run.steps import (
-    Abort,
-    AskBegin,
-    AskChoice,
-    AskFinish,
-    AskMount,
-    AskNumber,
-    AskRest,
-    AskScore,
-    AskStroke,
-    Begin,
-    Finish,
-    MagnitudeEstimate,
-    Note,
-    PairedChoice,
-    Pause,
-    Redo,
-    Resume,
-    Scored,
-    Skip,
-    StimulusMounted,
-    StrokeDone,
-    UndoRedo,
-)
+from sessions.run import steps
 
 TRIAL, NEXT = plan(protocol("sensotact-friction"), "S01", 3).trials[:2]
 ENDS = ("not at all", "very")
@@ -61,23 +38,23 @@ def read_line(command, line, *, forces=True):
 @pytest.mark.parametrize(
     ("command", "line", "event"),
     [
-        (AskMount(TRIAL), "", StimulusMounted(TRIAL.stimulus.code)),
-        (AskScore(TRIAL, ENDS), "37.5", Scored(37.5, input_device="keyboard")),
-        (AskScore(TRIAL, ENDS), "37,5", Scored(37.5, input_device="keyboard")),
-        (AskScore(TRIAL, ENDS), "-", Scored(None, input_device="keyboard")),
-        (AskScore(TRIAL, ENDS), "redo wrong finger", Redo("wrong finger")),
-        (AskStroke(TRIAL), "abort ill", Abort("ill")),
-        (AskStroke(TRIAL), "pause", Pause()),
-        (AskStroke(TRIAL), "skip broken sample", Skip("broken sample")),
-        (AskStroke(TRIAL), "undo", UndoRedo()),
-        (AskStroke(TRIAL), "resume", Resume()),
-        (AskNumber(TRIAL, "How rough?"), "12.5", MagnitudeEstimate(12.5, input_device="keyboard")),
-        (AskChoice(TRIAL, NEXT, "Which?"), "1", PairedChoice("first", input_device="keyboard")),
-        (AskChoice(TRIAL, NEXT, "Which?"), "2", PairedChoice("second", input_device="keyboard")),
-        (AskChoice(TRIAL, NEXT, "Which?"), "-", PairedChoice(None, input_device="keyboard")),
-        (AskRest(30.0), "", Resume()),
-        (AskBegin(), "", Begin()),
-        (AskFinish(), "", Finish()),
+        (steps.AskMount(TRIAL), "", steps.StimulusMounted(TRIAL.stimulus.code)),
+        (steps.AskScore(TRIAL, ENDS), "37.5", steps.Scored(37.5, input_device="keyboard")),
+        (steps.AskScore(TRIAL, ENDS), "37,5", steps.Scored(37.5, input_device="keyboard")),
+        (steps.AskScore(TRIAL, ENDS), "-", steps.Scored(None, input_device="keyboard")),
+        (steps.AskScore(TRIAL, ENDS), "redo wrong finger", steps.Redo("wrong finger")),
+        (steps.AskStroke(TRIAL), "abort ill", steps.Abort("ill")),
+        (steps.AskStroke(TRIAL), "pause", steps.Pause()),
+        (steps.AskStroke(TRIAL), "skip broken sample", steps.Skip("broken sample")),
+        (steps.AskStroke(TRIAL), "undo", steps.UndoRedo()),
+        (steps.AskStroke(TRIAL), "resume", steps.Resume()),
+        (steps.AskNumber(TRIAL, "How rough?"), "12.5", steps.MagnitudeEstimate(12.5, input_device="keyboard")),
+        (steps.AskChoice(TRIAL, NEXT, "Which?"), "1", steps.PairedChoice("first", input_device="keyboard")),
+        (steps.AskChoice(TRIAL, NEXT, "Which?"), "2", steps.PairedChoice("second", input_device="keyboard")),
+        (steps.AskChoice(TRIAL, NEXT, "Which?"), "-", steps.PairedChoice(None, input_device="keyboard")),
+        (steps.AskRest(30.0), "", steps.Resume()),
+        (steps.AskBegin(), "", steps.Begin()),
+        (steps.AskFinish(), "", steps.Finish()),
     ],
 )
 def test_a_line_means_what_was_asked_for(command, line, event):
@@ -85,28 +62,28 @@ def test_a_line_means_what_was_asked_for(command, line, event):
 
 
 def test_a_choice_of_two_names_both_stimuli_and_takes_no_third():
-    events, text = read_line(AskChoice(TRIAL, NEXT, "Which?"), "3")
+    events, text = read_line(steps.AskChoice(TRIAL, NEXT, "Which?"), "3")
     assert events == ()
     sentence = f"Which? 1 for the first ({TRIAL.stimulus.code}), 2 for the second ({NEXT.stimulus.code}):"
     assert text.count(sentence) == 2
 
 
 def test_a_number_that_may_be_a_thousand_is_asked_for_again():
-    events, output = read_line(AskNumber(TRIAL, "How rough?"), "1,000")
+    events, output = read_line(steps.AskNumber(TRIAL, "How rough?"), "1,000")
     assert events == ()
     assert "'1,000' is not valid now: it is 1000 or 1.000. How rough?" in output
 
 
 def test_enter_reports_a_stroke_only_where_no_transducer_feels_it():
-    assert read_line(AskStroke(TRIAL), "", forces=False)[0] == (StrokeDone(),)
-    events, output = read_line(AskStroke(TRIAL), "")
+    assert read_line(steps.AskStroke(TRIAL), "", forces=False)[0] == (steps.StrokeDone(),)
+    events, output = read_line(steps.AskStroke(TRIAL), "")
     assert events == ()
     assert "Nothing is waiting for Enter now" in output
 
 
 @pytest.mark.parametrize("line", ["", "good", "1 0"])
 def test_a_line_that_means_nothing_is_told_what_is_asked_for(line):
-    events, text = read_line(AskScore(TRIAL, ENDS), line)
+    events, text = read_line(steps.AskScore(TRIAL, ENDS), line)
     assert events == ()
     assert text.count(f"Score from 0 ({ENDS[0]}) to 100 ({ENDS[1]}):") == 2  # as asked, and once more
 
@@ -116,7 +93,7 @@ def test_a_pause_is_reported_once_with_how_it_ends_and_enter_does_nothing_meanwh
     terminal = Terminal(Console(as_json=False, err=out), forces=False, lines=io.StringIO("\n"))
     while not terminal.closed:
         time.sleep(0.001)
-    terminal.show(AskStroke(TRIAL))
+    terminal.show(steps.AskStroke(TRIAL))
     for state in ("ready", "paused", "paused"):
         terminal.follow(state)
     paused = "The session is paused. Type resume to continue."
@@ -126,7 +103,7 @@ def test_a_pause_is_reported_once_with_how_it_ends_and_enter_does_nothing_meanwh
 
 
 def test_a_session_is_ended_for_good_only_with_a_reason():
-    events, text = read_line(AskStroke(TRIAL), "abort ")
+    events, text = read_line(steps.AskStroke(TRIAL), "abort ")
     assert events == ()
     assert "say why: abort needs a reason" in text
 
@@ -137,13 +114,13 @@ def test_a_note_in_another_encoding_than_the_terminals_is_kept_with_escapes_and_
     terminal = Terminal(Console(as_json=False, err=io.StringIO()), forces=True, lines=lines)
     while not terminal.closed:
         time.sleep(0.001)
-    assert terminal.poll() == (Note(r"m\xfcde"), Pause())
+    assert terminal.poll() == (steps.Note(r"m\xfcde"), steps.Pause())
 
 
 def test_who_goes_on_at_a_terminal_with_a_session_of_the_window_can_type_there(tmp_path):
     folder = tmp_path / "P07"
     with Recorder.start() as recorder:
-        desk = Desk(recorder, {AskMount: lambda _: recorder.leave()})
+        desk = Desk(recorder, {steps.AskMount: lambda _: recorder.leave()})
         desk.begin(folder, people="simulated hand")
         desk.until(SessionEnded)
     words = [sys.executable, "-m", "daq_app", "resume", str(folder)]
