@@ -179,7 +179,7 @@ class PlotScale:
         >>> PlotScale(0.0, 20.0, 5.0).following(0.0, 1.0, 30.0).high
         5.0
         """
-        if not (least <= greatest):  # nan: no data
+        if not (-np.inf < least <= greatest < np.inf):  # nan: no data
             return self
         margin = SCALE_MARGIN * (self.high - self.low)
         if greatest > self.high + margin or least < self.low - margin:

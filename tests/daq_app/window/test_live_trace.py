@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from daq_app.window.live_trace import CHANNELS, LiveTrace
+from daq_app.window.live_trace import CHANNELS, LiveTrace, PlotScale
 
 
 def feed_blocks(trace, time, first_channel, *, block=117):
@@ -84,3 +84,9 @@ def test_the_ring_says_which_readings_were_dropped_for_newer_ones():
     assert trace.holds(250.0)
     trace.clear()
     assert trace.holds(0.0)
+
+
+@pytest.mark.parametrize(("least", "greatest"), [(0.0, np.inf), (-np.inf, 1.0), (np.inf, np.inf), (np.nan, np.nan)])
+def test_a_scale_stays_where_data_are_infinite_or_missing(least, greatest):
+    scale = PlotScale(0.0, 5.0, 5.0)
+    assert scale.following(least, greatest, 1.0) == scale
