@@ -220,9 +220,10 @@ class _Attendance:
                 self._recorder.send(m.Stop())
             self._watch_silence()
             if self._terminal is not None:
+                closed = self._terminal.closed  # read first, so that the last line is polled too
                 for event in self._terminal.poll():
                     self._recorder.send(event)
-                if self._terminal.closed and self._end is None:
+                if closed and self._end is None:
                     self._terminal = None
                     self._recorder.leave()
 

@@ -32,6 +32,11 @@ class Inbox:
         """Return the requests since the last call, in order."""
         return tuple(self._queue.popleft() for _ in range(len(self._queue)))
 
+    @property
+    def exhausted(self) -> bool:
+        """Whether the client is gone and every request of it was taken."""
+        return self.client_gone.is_set() and not self._queue
+
     def answer_stop(self) -> None:
         """End the nudging, so that later work is not interrupted."""
         with self._nudge_lock:

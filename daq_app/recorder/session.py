@@ -236,10 +236,13 @@ class _Operator:
         return acts if self._helper is None else (*acts, *self._helper.poll())
 
     def stop(self) -> Ending | None:
-        """Return why the session must end now: a stop, or the client is gone and no finger touches; else None."""
+        """Return why the session must end now: a stop, or the client is gone and no finger touches; else None.
+
+        What was answered before the client went still counts.
+        """
         if self._inbox.stop_wanted.is_set():
             return "stopped", STOPPED_BY_USER
-        if not self._inbox.client_gone.is_set():
+        if not self._inbox.exhausted:
             return None
         now_ns = self._clock.now_ns()
         self._alone_ns = now_ns if self._alone_ns is None else self._alone_ns

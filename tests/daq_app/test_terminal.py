@@ -193,3 +193,13 @@ def test_a_second_ctrl_c_leaves_a_recorder_that_does_not_answer_and_it_ends_the_
     while not (folder / "MANIFEST.json").exists():
         time.sleep(0.05)
     assert Recording.open(folder).end["cause"] == "stopped"
+
+
+def test_the_last_line_before_a_terminal_closes_is_heard(tmp_path):
+    folder = tmp_path / "s"
+    words = ["run", "sensotact-friction", "--scores-only", "--subject", "P01", "--out", str(folder)]
+    words = [sys.executable, "-m", "daq_app", *words]
+    process = subprocess.run(words, input="note seen\nabort ill\n", capture_output=True, text=True, check=False)
+    assert process.returncode == 3, process.stderr
+    assert [event.data.get("text") for event in Recording.open(folder).events if event.kind == "note"] == ["seen"]
+    assert Recording.open(folder).end["reason"] == "ill"
