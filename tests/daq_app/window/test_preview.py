@@ -10,14 +10,6 @@ from sessions.plan.plan import Visibility
 from sessions.plan.protocols.protocol import protocol, protocol_names
 from tests.daq_app.session_messages import PLAN, READY, after
 
-ANSWERS = {
-    "adaptive-comparison": "choice",
-    "constant-stimuli": "choice",
-    "magnitude-estimation": "number",
-    "paired-comparison": "choice",
-    "sensotact-friction": "line",
-}
-
 
 @pytest.mark.parametrize("name", protocol_names())
 def test_every_text_that_a_protocol_gives_the_subject_is_on_a_page(name):
@@ -28,7 +20,7 @@ def test_every_text_that_a_protocol_gives_the_subject_is_on_a_page(name):
         assert block.instruction in text
         assert block.question in text
         assert all(end in text for end in block.scale_ends or ())
-    assert {page.view.kind for page in pages} == {"read", ANSWERS[name]}
+    assert {page.view.kind for page in pages} == {"read", study.scale.answer}
 
 
 def test_pages_come_in_the_course_of_a_session_and_each_once():
