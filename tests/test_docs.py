@@ -10,6 +10,7 @@ from daq_app.accuracy_page.page import fill_marks
 from daq_app.cli.main import VERBS
 from drivers.catalog import DRIVERS
 from sessions.exchange import FORMATS
+from sessions.plan.protocols.protocol import protocol_names
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -67,6 +68,11 @@ def test_every_export_is_named_on_the_page_of_exports_to_which_the_readme_leads(
     page = (ROOT / page).read_text(encoding="utf-8")
     for name in FORMATS:
         assert f"| `{name}` |" in page, f"docs/how-to/export-and-import.md: the table has no row for {name}"
+
+
+def test_the_page_on_protocols_names_every_built_in_one():
+    page = (ROOT / "docs" / "how-to" / "add-a-protocol.md").read_text(encoding="utf-8")
+    assert [name for name in protocol_names() if f"\n- `{name}`" not in page] == []
 
 
 def test_every_table_that_the_accuracy_run_writes_has_its_place_on_one_page():
