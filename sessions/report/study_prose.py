@@ -16,6 +16,7 @@ from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.tables.scales import psychometric_sentences, scale_sentences, study_functions
 from sessions.report.tables.session import paths_sentence
 from sessions.report.wording import capital, correlation, digits, full_stop, plural, shown_response, significant
+from sessions.statistics.correlations import LEAST_CASES
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.multiverse import Kinematics
 from sessions.statistics.scores import by_key
@@ -79,16 +80,21 @@ def _relation_sentences(findings: DescriptorFindings, study: StudyFindings) -> l
     if findings.repeated is None:
         trials = Counter(subject for subject, *_ in findings.points)
         if sum(trials.values()) - len(trials) - 1 < 2:
-            return [f"{name}: too few subjects with scores and strokes of their own for a correlation within subjects."]
+            return [
+                f"{name}: too few trials have both a score and a predicted {label} to correlate them within subjects."
+            ]
         return [f"{name}: no correlation within subjects, since score and {label} both vary in none of them."]
     repeated = findings.repeated
     interval = f"no interval from {plural(repeated.subjects, 'subject')} with two trials or more"
+    if repeated.subjects >= LEAST_CASES:
+        interval = "no interval, since subjects are alike or r is perfect"
     if repeated.people is not None:
         low, high = map(correlation, repeated.people)
         interval = f"95 % interval for other people on these surfaces {low} to {high}"
     return [
         f"{name}: within subjects, score and the {label} predicted at {strain} strain go together by "
-        f"r = {correlation(repeated.r)}, {interval}; {_otherwise(findings, other_strain)}."
+        f"r = {correlation(repeated.r)} over {plural(len(findings.points), 'trial')}, {interval}; "
+        f"{_otherwise(findings, other_strain)}."
     ]
 
 
@@ -100,12 +106,13 @@ def _otherwise(findings: DescriptorFindings, other_strain: Kinematics) -> str:
     if alternative is None:
         return f"at {other_strain} strain, which was not tried here, the sign may differ"
     trials = plural(alternative.trials, "trial")
-    if alternative.within is None or alternative.low is None or alternative.high is None:
-        count = f"{trials} of {len(findings.points)}"
-        return f"at {other_strain} strain {count} had a prediction, too few for a correlation"
-    interval = f"{correlation(alternative.low)} to {correlation(alternative.high)}"
+    if alternative.within is None:
+        return f"at {other_strain} strain no correlation, of {trials} with a score and a prediction there"
+    interval = "no interval"
+    if alternative.low is not None and alternative.high is not None:
+        interval = f"{correlation(alternative.low)} to {correlation(alternative.high)}"
     r = correlation(alternative.within)
-    return f"at {other_strain} strain r = {r} ({interval}) of the {trials} that have one there"
+    return f"at {other_strain} strain r = {r} ({interval}) over the {trials} with a prediction there"
 
 
 def subject_facts(study: StudyFindings) -> list[Fact]:

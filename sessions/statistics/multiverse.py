@@ -188,8 +188,8 @@ class PathFinding:
 
     path: Path
     usual: bool
-    surfaces: int  # with a prediction on this path
-    trials: int
+    surfaces: int  # with a score and a prediction on this path
+    trials: int  # likewise
     r: float | None  # Pearson's, of the mean prediction of each surface against its mean score
     within: float | None  # repeated-measures correlation of each subject's own scores and predictions
     low: float | None  # 95 % interval of `within`, for other subjects on the same surfaces
@@ -222,8 +222,8 @@ def path_findings(
 
 
 def _finding(number: int, path: Path, trials: Sequence[PathTrial], *, usual: bool, within: bool) -> PathFinding:
-    with_value = [(trial, value) for trial in trials if (value := trial.values[number]) is not None]
-    points = [(trial, value, trial.score) for trial, value in with_value if trial.score is not None]
+    values_here = [(trial, trial.values[number], trial.score) for trial in trials]
+    points = [(trial, value, score) for trial, value, score in values_here if value is not None and score is not None]
     pairs = [(trial.subject, value, score) for trial, value, score in points]
     values = surface_means([(trial.subject, trial.index, value) for trial, value, _ in points]) or {}
     scores = surface_means([(trial.subject, trial.index, score) for trial, _, score in points]) or {}
@@ -232,8 +232,8 @@ def _finding(number: int, path: Path, trials: Sequence[PathTrial], *, usual: boo
     return PathFinding(
         path=path,
         usual=usual,
-        surfaces=len({trial.index for trial, _ in with_value}),
-        trials=len(with_value),
+        surfaces=len({trial.index for trial, _, _ in points}),
+        trials=len(points),
         r=pearson(list(values.values()), list(scores.values())),
         within=None if repeated is None else repeated.r,
         low=low,

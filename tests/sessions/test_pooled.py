@@ -265,19 +265,58 @@ def test_the_headline_says_whether_the_other_strain_was_tried_and_what_it_gave()
     untried = summary(plain)[1]
     assert "at small strain go together by r = " in untried
     assert untried.endswith("at finite strain, which was not tried here, the sign may differ.")
-    opposite_visits = [
-        replace(
-            v,
-            rows=tuple(
-                replace(row, rule="maximum", paths=tuple(SENSE[p.kinematics] * row.sed for p in PATHS))
-                for row in v.rows
-            ),
-        )
-        for v in VISITS[:4]
-    ]
-    sentence = summary(pool_visits(opposite_visits))[1]
+    sentence = summary(pool_visits([opposite(v) for v in VISITS[:4]]))[1]
     assert f"at finite strain r = −{plain.descriptors[0].repeated.r:.2f}" in sentence
-    assert "of the 20 trials that have one there" in sentence
+    assert "over the 20 trials with a prediction there" in sentence
+
+
+def opposite(v):
+    """Return a visit whose SEDs have the other sense at finite strain."""
+    rows = (replace(row, rule="maximum", paths=tuple(SENSE[p.kinematics] * row.sed for p in PATHS)) for row in v.rows)
+    return replace(v, rows=tuple(rows))
+
+
+@pytest.mark.parametrize("subjects", [1, 2])
+def test_the_headline_of_one_or_two_subjects_gives_the_r_of_the_other_strain_without_an_interval(subjects):
+    """Between two subjects, or within one, r is the plain correlation of what is left of each subject's means."""
+    visits = [opposite(v) for v in VISITS[:subjects]]
+    left = np.hstack(
+        [
+            np.array([[row.sed, row.score] for row in v.rows]).T
+            - np.mean([[r.sed, r.score] for r in v.rows], 0)[:, None]
+            for v in visits
+        ]
+    )
+    r = np.corrcoef(left)[0, 1]
+    finite = f"{r:.4f}" if subjects == 1 else f"{r:.2f}"
+    sentence = summary(pool_visits(visits))[1]
+    assert f"at finite strain r = −{finite} (no interval) over the {5 * subjects} trials" in sentence
+
+
+def test_the_headline_counts_the_trials_of_its_correlations_alone():
+    visits = [
+        replace(v, rows=tuple(replace(r, score=None, outcome="not answered") if r.trial == 2 else r for r in v.rows))
+        for v in map(opposite, VISITS[:4])
+    ]
+    sentence = summary(pool_visits(visits))[1]
+    assert " over 16 trials, 95 % interval" in sentence
+    assert sentence.endswith("over the 16 trials with a prediction there.")
+
+
+def test_scored_strokes_without_a_prediction_are_not_said_to_be_missing():
+    """At finite strain many sticky surfaces have no full slip, although each was stroked and scored."""
+    one_each = [replace(v, rows=tuple(r if r.index == 0 else replace(r, sed=None) for r in v.rows)) for v in VISITS]
+    assert summary(pool_visits(one_each))[1] == (
+        "Stickiness: too few trials have both a score and a predicted SED to correlate them within subjects."
+    )
+
+
+def test_a_perfect_r_of_many_subjects_has_no_interval_for_that_reason():
+    exact = [replace(v, rows=tuple(replace(r, score=1e4 * (r.sed - 0.004)) for r in v.rows)) for v in VISITS]
+    assert (
+        "r = +1.00 over 50 trials, no interval, since subjects are alike or r is perfect;"
+        in summary(pool_visits(exact))[1]
+    )
 
 
 def test_a_study_of_one_subject_says_why_tables_are_missing():
