@@ -13,7 +13,7 @@ NO_ESTIMATES = {
                "different r"},
     "settings": {"depth", "depth of the model", "true µ", "true τ max", "true speed", "true",
                  "ended as planned", "counted", "inside"},
-    "answers": {"score"},
+    "answers": {"score", "answer"},
     "doubt": {"estimated error", "solved in", "agree", "exact p of rho", "p", "p, Holm", "Friedman's p", "Page's p",
               "off by", "Steiger's Z", "left-out error", "AIC weight"},
     "descriptions": {"r without one", "r with one left out", "Kendall's W", "least", "lower quartile", "median",

@@ -105,6 +105,22 @@ def test_choices_of_one_of_two_stand_in_the_table_and_are_told_to_count_for_no_m
     assert [r for r in remarks(findings) if "S02" in r and f"{len(rows)} choices of one of two" in r]
     table = list(csv.DictReader(io.StringIO(trials_csv(findings))))
     assert {row["choice"] for row in table if row["session"] == "S02"} == {"first"}
+    (trials,) = study_tables(findings)["trials"]
+    assert {row[2].text for row in trials.groups[1].rows} == {"first"}
+
+
+def test_numbers_and_choices_are_answers_of_a_visit_as_scores_are():
+    def answered(v, **answer):
+        return replace(v, rows=tuple(replace(row, score=None, **answer) for row in v.rows))
+
+    visits = [VISITS[0], answered(VISITS[1], estimate=7.0), answered(VISITS[2], choice="second"), answered(VISITS[3])]
+    (table,) = study_tables(pool_visits(visits))["visits"]
+    assert [row[2].text for row in table.groups[0].rows] == ["5 of 5", "5 of 5", "5 of 5", "0 of 5"]
+
+
+def test_every_heading_of_a_table_has_its_brackets_in_pairs():
+    tables = [table for section in study_tables(study()).values() for table in section]
+    assert not [column for table in tables for column in table.columns if set("[]") & set(column.name + column.unit)]
 
 
 def test_who_missed_a_surface_does_not_make_it_look_scored_low():

@@ -10,7 +10,14 @@ from sessions.report.tables import Cell, Format, Row, Table, number_cell, range_
 from sessions.report.tables.rivals import rival_tables
 from sessions.report.tables.scales import latent_table, psychometric_table, scales_table, study_functions
 from sessions.report.tables.session import paths_table, rank_interval, score_cells, spread_cell
-from sessions.report.tables.study_models import flaws_table, ground_truth_table, models_table, study_model, trials_table
+from sessions.report.tables.study_models import (
+    answer_of,
+    flaws_table,
+    ground_truth_table,
+    models_table,
+    study_model,
+    trials_table,
+)
 from sessions.report.wording import (
     NONE,
     correlation,
@@ -62,7 +69,7 @@ def _visits(study: StudyFindings) -> Table | None:
         return (
             visit.session,
             visit.subject,
-            f"{sum(row.score is not None for row in visit.rows)} of {len(visit.rows)}",
+            f"{sum(answer_of(row) is not None for row in visit.rows)} of {len(visit.rows)}",
             str(sum(row.sed is not None for row in visit.rows)) if visit.forces else NONE,
             "yes" if visit.complete else "no",
             sum(bool(row.flaws) for row in visit.rows),

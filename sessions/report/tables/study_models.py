@@ -135,7 +135,7 @@ def trials_table(study: StudyFindings) -> Table | None:
     if sum(len(visit.rows) for visit in study.visits) > _MOST_TRIALS:
         return None
     columns = (
-        "trial | index | score [0–100] or number | µ [1] | τ max [kPa] | N [N] | speed [mm/s] | SED [kPa] | "
+        "trial | index | answer [score: 0–100] | µ [1] | τ max [kPa] | N [N] | speed [mm/s] | SED [kPa] | "
         "estimated error [%] | flaws"
     )
     groups = [
@@ -158,8 +158,15 @@ def _exclusion_note(study: StudyFindings, visit: Visit, descriptor: str) -> str:
     return "" if exclusion is None else " (left out of every number above)"
 
 
+def answer_of(row: TrialRow) -> float | str | None:
+    """Return the subject's answer: a score, a number on a scale of its own, or a choice; None without one."""
+    return (
+        row.choice if row.score is None and row.estimate is None else row.estimate if row.score is None else row.score
+    )
+
+
 def _row(row: TrialRow) -> Row:
-    answer = row.score if row.score is not None else row.estimate
+    answer = answer_of(row)
     reason = row.why or "withheld: the flaws say why"
 
     def estimate(name: str, as_text: Format, unit: float = 1.0, without: str = _TOO_FEW) -> Cell:
@@ -169,7 +176,7 @@ def _row(row: TrialRow) -> Row:
     return (
         row.trial,
         row.index,
-        number_cell(answer, places(1), f"no score: {row.outcome}"),
+        answer if isinstance(answer, str) else number_cell(answer, places(1), f"no answer: {row.outcome}"),
         estimate("mu", places(3)),
         estimate("tau_max", tau, 1e3),
         estimate("normal_force", places(2)),
