@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -137,6 +138,15 @@ def test_means_over_subjects_are_geometric_and_stand_in_the_last_row():
         "Friction: over 2 of 3 subjects the surface felt equal to the standard has 1.20 (1.10 to 1.30) times its µ; "
         "over 2 the just noticeable difference is 15 % of it (10 to 20)."
     ]
+    steps = ("friction", dict.fromkeys(("S1", "S2"), function), (replace(pse, n=2), None))
+    assert psychometric_sentences(steps)[0].endswith(
+        " 1.20 (1.10 to 1.30) times its µ; every subject's answers step between two comparisons, so no just noticeable "
+        "difference is above 0."
+    )
+    some = ("friction", dict.fromkeys(("S1", "S2"), function), (pse, Average(1, middle, None, None, None)))
+    assert psychometric_sentences(some)[0].endswith(
+        "over the 1 whose just noticeable difference is above 0 it is 15 % of it, too great for all 2."
+    )
     first, _, withheld, mean = psychometric_table([results]).groups[0].rows
     assert [cell.text for cell in first[2:5]] == ["1.25", "18", "4.0"]
     assert {cell.note for cell in withheld[2:5]} == {"too few"}

@@ -137,12 +137,11 @@ def psychometric_sentences(results: PsychometricResults) -> list[str]:
     sentences: list[str] = []
     if len(functions) == 1:
         sentences += [_psychometric_sentence(title, function) for function in functions.values()]
-    elif pse is not None and jnd is not None:
+    elif pse is not None:
         equal = f"{digits(math.exp(pse.mean), 2)}{_range(bounds(pse.low, pse.high), math.exp, 2)}"
-        least = f"{digits(_mean_percent(jnd.mean), 0)} % of it{_range(bounds(jnd.low, jnd.high), _mean_percent, 0)}"
         sentences.append(
             f"{title}: over {pse.n} of {len(functions)} subjects the surface felt equal to the standard has {equal} "
-            f"times its µ; over {jnd.n} the just noticeable difference is {least}."
+            f"times its µ; {_mean_jnd(jnd, pse.n)}."
         )
     elif functions:
         sentences.append(f"{title}: no subject's answers give a psychometric function; the table says why.")
@@ -151,6 +150,16 @@ def psychometric_sentences(results: PsychometricResults) -> list[str]:
         count_text = f"{falling} of {plural(len(fits), 'subject')}"
         sentences.append(f"{title}: {count_text} chose the surface of less µ more often.")
     return sentences
+
+
+def _mean_jnd(jnd: Average | None, subjects: int) -> str:
+    """Return a clause on the mean JND; a step between two comparisons has a JND of 0, which has no logarithm."""
+    if jnd is None:
+        return "every subject's answers step between two comparisons, so no just noticeable difference is above 0"
+    least = f"{digits(_mean_percent(jnd.mean), 0)} % of it{_range(bounds(jnd.low, jnd.high), _mean_percent, 0)}"
+    if jnd.n == subjects:
+        return f"over {jnd.n} the just noticeable difference is {least}"
+    return f"over the {jnd.n} whose just noticeable difference is above 0 it is {least}, too great for all {subjects}"
 
 
 def _psychometric_sentence(title: str, function: Psychometric) -> str:

@@ -160,9 +160,7 @@ def _exclusion_note(study: StudyFindings, visit: Visit, descriptor: str) -> str:
 
 def answer_of(row: TrialRow) -> float | str | None:
     """Return the subject's answer: a score, a number on a scale of its own, or a choice; None without one."""
-    return (
-        row.choice if row.score is None and row.estimate is None else row.estimate if row.score is None else row.score
-    )
+    return next((answer for answer in (row.score, row.estimate, row.choice) if answer is not None), None)
 
 
 def _row(row: TrialRow) -> Row:
