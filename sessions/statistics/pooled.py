@@ -252,7 +252,7 @@ def estimates(trials: Trials, quantity: str) -> Estimates | None:
     rows = [(visit.subject, row, row.estimate) for visit, row in trials if row.estimate is not None]
     if not rows:
         return None
-    no_logarithm = {subject for subject, _, value in rows if value <= 0.0}
+    no_logarithm = _without_logarithm(trials)
     logs = [(subject, row, math.log(value)) for subject, row, value in rows if subject not in no_logarithm]
     table = {
         subject: {index: float(np.mean(values)) for index, values in by_key(pairs).items()}
@@ -265,17 +265,24 @@ def estimates(trials: Trials, quantity: str) -> Estimates | None:
     )
 
 
+def _without_logarithm(trials: Trials) -> set[str]:
+    """Return the subjects with an estimate not above 0. To drop that alone would make their least surfaces greater."""
+    return {visit.subject for visit, row in trials if row.estimate is not None and row.estimate <= 0.0}
+
+
 def exponent(trials: Trials) -> scales.Exponent | None:
     """Return Stevens' exponent of magnitude estimates on the µ of the same strokes; None without estimates."""
     if all(row.estimate is None for _, row in trials):
         return None
+    no_logarithm = _without_logarithm(trials)
     complete = [
         (visit.subject, row.index, row.estimate, row.mu)
         for visit, row in trials
-        if row.estimate is not None and row.estimate > 0.0 and row.mu is not None and row.mu > 0.0
+        if visit.subject not in no_logarithm and row.estimate is not None and row.mu is not None and row.mu > 0.0
     ]
     if not complete:
-        return scales.Exponent(0, 0, None, reason="no trial has both an estimate above 0 and a µ of its own stroke")
+        reason = "no trial has both an estimate and a µ of its own stroke, by a subject whose estimates are all above 0"
+        return scales.Exponent(0, 0, None, reason=reason)
     return scales.stevens_exponent(*zip(*complete, strict=True))
 
 
@@ -323,7 +330,8 @@ def latent_scales(
     """Return the latent values of each surface by each kind of judgement that has any."""
     scores = [(visit.subject, row.index, row.score) for visit, row in trials if row.score is not None]
     estimates = [(visit.subject, row.index, row.estimate) for visit, row in trials if row.estimate is not None]
-    logs = [(subject, index, math.log(estimate)) for subject, index, estimate in estimates if estimate > 0.0]
+    no_logarithm = _without_logarithm(trials)
+    logs = [(subject, i, math.log(estimate)) for subject, i, estimate in estimates if subject not in no_logarithm]
     jnd = None if comparisons is None else comparisons.jnd
     by_judgement: dict[scales.Judgement, Mapping[int, IntervalEstimate]] = {
         "scores": scales.latent_judgements(scores),

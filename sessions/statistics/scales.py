@@ -60,7 +60,7 @@ class PairedScale:
     first: IntervalEstimate | None = None  # advantage of coming first, in the same unit
     deviance: float | None = None  # against a separate probability for every ordered pair
     freedom: int | None = None  # degrees of freedom of that deviance
-    p: float | None = None  # of that deviance, by chi squared; too small where pairs were met only a few times
+    p: float | None = None  # of that deviance, by chi squared; approximate where pairs were met a few times
     reason: str = ""
     interval_reason: str = ""  # why the values have no intervals
 

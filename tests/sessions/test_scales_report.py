@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sessions.report.tables.scales import psychometric_sentences, psychometric_table, scale_sentences, scales_table
-from sessions.statistics.pooled import choices, constant_stimuli, exponent
+from sessions.statistics.pooled import choices, constant_stimuli, exponent, latent_scales
 from sessions.statistics.psychometric import Psychometric
 from sessions.statistics.scales import MODELS, Choice, consistence, paired_scale
 from sessions.statistics.scores import Average, IntervalEstimate
@@ -43,6 +43,17 @@ def test_each_surface_has_a_row_with_both_values_and_their_intervals_and_the_fir
     (fit, _) = scale_sentences(descriptor(answers_of(40, 1)))
     assert "Bradley–Terry" in fit
     assert "on 3 degrees of freedom" in fit  # six ordered pairs, two values and the first's advantage
+    assert fit.endswith(", by chi squared: few answers to a pair make p too small or too great.")
+
+
+def test_subjects_with_a_tied_pair_are_counted_beside_those_with_a_coefficient_of_consistence():
+    pairs = [(a, b) for a in (0, 50, 100) for b in (0, 50, 100) if a != b]
+    answers = [Choice(f"P{n}", a, b, a > b) for n in range(2) for a, b in pairs]
+    answers += [Choice("P9", a, b, first_chosen=True) for a, b in pairs]  # the first each time: every pair is tied
+    assert scale_sentences(descriptor(answers))[-1] == (
+        "Stickiness: of 3 subjects 2 compared every pair without a tie, and 2 of these chose by one order without a "
+        "circle; mean coefficient of consistence 1.00."
+    )
 
 
 def test_without_a_finite_scale_the_rows_have_the_reason():
@@ -93,13 +104,34 @@ def test_the_interval_of_an_exponent_holds_the_true_one_with_and_without_errors_
     (sentence,) = scale_sentences(table)
     interval = r"([\d.]+) \(([\d.]+) to ([\d.]+)\)"
     numbers = re.fullmatch(
-        f"Stickiness: if estimates are a power of µ, its exponent is {interval} with µ taken as exact, "
+        f"Stickiness: if estimates are a power of µ, its exponent by 12 trials of 4 subjects is {interval} with µ "
+        "taken as exact, "
         rf"{interval} with errors in both\.",
         sentence,
     )
     for value, low, high in np.reshape([float(number) for number in numbers.groups()], (2, 3)):
         assert low < value < high
         assert low < 1.5 < high < low + 0.3
+
+
+def test_a_subject_with_an_estimate_of_zero_counts_for_no_exponent_and_for_no_latent_value():
+    """A zero left out alone would raise that subject's least surface, and flatten the law of the others."""
+    rng = np.random.default_rng(2)
+    trials = [
+        row(
+            f"P{subject}", index=index, mu=0.2 + 0.005 * index, estimate=float((0.2 + 0.005 * index) * rng.lognormal(1))
+        )
+        for subject in range(5)
+        for index in (0, 20, 50, 80, 100)
+        for _ in range(2)
+    ]
+    for _, trial in trials:
+        trial.score = None
+    zero = [(visit, trial) for visit, trial in trials if visit.subject == "P0"]
+    others = [(visit, trial) for visit, trial in trials if visit.subject != "P0"]
+    zero[0][1].estimate = 0.0
+    assert exponent(trials) == exponent(others)
+    assert latent_scales(trials, (), None) == latent_scales(others, (), None)
 
 
 def logs(*ratios):

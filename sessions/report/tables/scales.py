@@ -76,12 +76,21 @@ def scale_sentences(findings: DescriptorFindings) -> list[str]:
             if scale.deviance is not None and scale.p is not None
             for p in [p_value(scale.p) if scale.p < 0.001 else f"= {p_value(scale.p)}"]
         ]
-        sentences.append(f"{name}: deviance of the scales from choices: {', '.join(fits)}.")
+        sentences.append(
+            f"{name}: deviance of the scales from choices: {', '.join(fits)}, by chi squared: few answers to a pair "
+            "make p too small or too great."
+        )
     if findings.consistence:
         zeta = [exponent.zeta for exponent in findings.consistence.values()]
         orders = sum(value == CONSISTENT for value in zeta)
+        total = findings.scales[0].subjects
+        count = f"{orders} of {plural(total, 'subject')}"
+        if len(zeta) < total:
+            count = (
+                f"of {plural(total, 'subject')} {len(zeta)} compared every pair without a tie, and {orders} of these"
+            )
         sentences.append(
-            f"{name}: {orders} of {plural(len(zeta), 'subject')} chose by one order without a circle; mean "
+            f"{name}: {count} chose by one order without a circle; mean "
             f"coefficient of consistence {digits(float(np.mean(zeta)), 2)}."
         )
     exponent = findings.exponent
@@ -92,7 +101,8 @@ def scale_sentences(findings: DescriptorFindings) -> list[str]:
             value, low, high = exponent.deming
             interval = _range(bounds(low, high), float, 2) or " (no interval: all subjects are alike)"
             estimates += f", {digits(value, 2)}{interval} with errors in both"
-        sentences.append(f"{name}: if estimates are a power of µ, its exponent is {estimates}.")
+        data = f"by {plural(exponent.trials, 'trial')} of {plural(exponent.subjects, 'subject')}"
+        sentences.append(f"{name}: if estimates are a power of µ, its exponent {data} is {estimates}.")
     elif exponent is not None and exponent.reason:
         sentences.append(f"{name}: no exponent of the estimates by µ: {exponent.reason}.")
     return sentences
