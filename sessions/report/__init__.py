@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from sessions.plan.plan import SessionPlan
-from sessions.prediction import BY_NAME, SED, SessionPrediction
+from sessions.prediction import BY_NAME, SED, Kinematics, SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, Firing
 from sessions.prediction.stored import model_facts
 from sessions.prediction.surface_series import other_signs
@@ -71,7 +71,14 @@ def findings(
         ),
         remarks=facts.remarks(recording, analysis, tables),
         flaws=flaws(analysis),
-        experiments=experiments(plan, tables, visit, analysis.settings.area, extras.response),
+        experiments=experiments(
+            plan,
+            tables,
+            visit,
+            analysis.settings.area,
+            extras.response,
+            "small" if prediction is None else prediction.options.kinematics,
+        ),
         course=course(recording),
         fields=fields(prediction),
         ground_truth=tuple(ground_truth or ()),
@@ -119,12 +126,17 @@ def _simulation_notice(recording: Recording, tables: Sequence[ScoreTable]) -> st
 
 
 def experiments(
-    plan: SessionPlan, tables: Sequence[ScoreTable], visit: Visit, law: AreaLaw = FIXED, response: str = SED.name
+    plan: SessionPlan,
+    tables: Sequence[ScoreTable],
+    visit: Visit,
+    law: AreaLaw = FIXED,
+    response: str = SED.name,
+    kinematics: Kinematics = "small",
 ) -> tuple[Experiment, ...]:
     """Return one experiment for each block; `visit` holds the trials with measurements and predictions.
 
     `response` names the model's quantity that is compared with scores and rivals, and the quantity of the visit's
-    paths. `law` gives the contact area of all numbers except those of the paths.
+    paths. `law` gives the contact area, and `kinematics` the strain, of all numbers except those of the paths.
     """
     label = BY_NAME[response].label
     blocks: list[Experiment] = []
@@ -155,7 +167,7 @@ def experiments(
                 own_scores=own_scores,
                 rivals=rivals_of_means(score_of, series, label) if responses and score_of else (),
                 response=response,
-                paths=path_findings(along, "small", law, within=False),
+                paths=path_findings(along, kinematics, law, within=False),
                 psychometric=subject_function([(visit, row) for row in trials]) if block.standard else None,
                 other_answers=() if block.standard else _other_answers(trials),
             )

@@ -210,13 +210,16 @@ class PathTrial:
 def path_findings(
     trials: Sequence[PathTrial], kinematics: str, law: AreaLaw = FIXED, *, within: bool
 ) -> tuple[PathFinding, ...]:
-    """Return the correlation of predictions with scores along each path, also `within` subjects; () without paths."""
+    """Return the correlation of predictions with scores along each path, also `within` subjects; () without paths.
+
+    Where trials differ in their rule of mu no path is the usual one.
+    """
     path_trials = [trial for trial in trials if trial.values]
     if not path_trials:
         return ()
-    rule, path_count = path_trials[0].rule, min(len(trial.values) for trial in path_trials)
+    rules, path_count = {trial.rule for trial in path_trials}, min(len(trial.values) for trial in path_trials)
     return tuple(
-        _finding(n, path, path_trials, usual=path.usual(rule, kinematics, law), within=within)
+        _finding(n, path, path_trials, usual=all(path.usual(rule, kinematics, law) for rule in rules), within=within)
         for n, path in enumerate(PATHS[:path_count])
     )
 

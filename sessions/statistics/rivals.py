@@ -59,7 +59,8 @@ class Rival:
     # Root mean square error of a surface's scores by the line through the others [points]
     left_out_error: float | None = None
     weight: float | None = None  # Akaike's, of the mixed model with subjects and surfaces crossed
-    same_order: bool | None = None  # orders the surfaces as the model's quantity, or exactly in reverse
+    # Orders the surfaces as the model's quantity, or exactly in reverse; None where it lacks one of them
+    same_order: bool | None = None
     needed: int | None = None  # surfaces needed by Steiger's test to distinguish the two correlations of means
     reasons: dict[str, str] = field(default_factory=dict[str, str])
 
@@ -137,6 +138,8 @@ def _mean_rival(name: str, model: str, scores: Mapping[int, float], series: Mapp
     values = {quantity: [series[quantity][i] for i in indices] for quantity in quantities}
     if name != model:
         rival = _compare(rival, values[model], values[name], score)
+        if len(indices) < sum(i in series[model] for i in scores):
+            rival = replace(rival, same_order=None)
     if MODEL_MU not in quantities or name == MODEL_MU:
         return _because(rival, partial="µ itself is given")
     xy, xz, yz = pearson(values[name], score), pearson(values[name], values[MODEL_MU]), pearson(score, values[MODEL_MU])

@@ -61,7 +61,7 @@ def tables(subjects=10):
     ]
 
 
-def experiments_of(score_tables):
+def experiments_of(score_tables, **options):
     """Return the experiments of a visit that the scores are not of, to all surfaces in their order."""
     rows = tuple(
         TrialRow(
@@ -82,7 +82,8 @@ def experiments_of(score_tables):
         )
         for number, (descriptor, index) in enumerate(((d, i) for d, rows in TABLES.items() for i in rows), 1)
     )
-    return experiments(plan("P99"), score_tables, Visit("P99-forces", "P99", "p", "", True, True, rows, (), {}))
+    visit = Visit("P99-forces", "P99", "p", "", True, True, rows, (), {})
+    return experiments(plan("P99"), score_tables, visit, **options)
 
 
 def along(index, sed):

@@ -130,6 +130,13 @@ def test_one_path_is_the_usual_one_and_the_distribution_counts_them_all():
     assert whole.distinct == 2  # of so many paths, one result for each receptor
 
 
+def test_trials_of_two_rules_of_mu_have_no_usual_path():
+    """A path takes one rule for all: strokes both ways, each by its own rule, are on none of them."""
+    rules = ("maximum", "mean over steady window")
+    trials = [PathTrial("A", n, float(n), rules[n % 2], tuple(8.0 + n for _ in SMALL)) for n in range(4)]
+    assert not [finding for finding in path_findings(trials, "small", within=False) if finding.usual]
+
+
 def test_a_path_that_leaves_too_few_surfaces_gives_no_correlation_and_is_counted():
     trials = [PathTrial("A", i, float(i), "maximum", (8.0 + i, *(None for _ in SMALL[1:]))) for i in (0, 20, 50)]
     findings = path_findings(trials, "small", within=False)

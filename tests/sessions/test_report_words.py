@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from report_example import TABLES, example
+from report_example import TABLES, example, experiments_of, tables
 from study_example import study
 
 from sessions.prediction.stored import Variant
@@ -63,6 +63,20 @@ def test_paths_that_all_agree_are_not_said_to_differ(report):
     ]
     sentence = paths_sentence("stickiness", paths)
     assert f", {len(alike) - 1} with another sign than the usual path; 2 of these differ" in sentence
+
+
+def test_the_usual_path_has_the_strain_of_the_report_s_prediction():
+    (usual,) = [path.path.kinematics for path in experiments_of(tables())[0].paths if path.usual]
+    assert usual == "small"
+    at_finite = experiments_of(tables(), kinematics="finite")[0].paths  # none of these paths was at finite strain
+    assert not [path for path in at_finite if path.usual]
+
+
+def test_paths_say_which_correlation_they_give(report):
+    over_surfaces = [replace(path, within=None) for path in report.experiments[0].paths]
+    assert " give a correlation over surfaces, from " in paths_sentence("stickiness", over_surfaces)
+    within = [replace(path, within=0.5) for path in over_surfaces]
+    assert " give a correlation within subjects, from +0.50 to +0.50" in paths_sentence("stickiness", within)
 
 
 def test_trials_without_a_number_in_a_variant_are_no_points_of_its_correlation(report):

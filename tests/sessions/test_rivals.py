@@ -148,6 +148,24 @@ def test_what_has_no_number_has_a_reason_instead():
     assert rivals_of_means({0: 1.0}, {MODEL_MU: {0: 1.0}}) == ()
 
 
+def test_only_rivals_of_all_the_surfaces_are_said_to_order_them_as_the_model_does():
+    """At finite strain two of five surfaces have no SED, and two of its three a static peak too."""
+    mu = {0: 0.2, 20: 0.3, 50: 0.45, 80: 0.5, 100: 0.7}
+    sed = {0: 1.0, 20: 2.0, 50: 4.0, 80: 4.5}
+    static = {index: 1.2 * mu[index] for index in (0, 20, 80, 100)}
+    scores = {0: 5.0, 20: 30.0, 50: 44.0, 80: 81.0, 100: 90.0}
+    rivals = rivals_of_means(scores, {MODEL_SED: sed, MODEL_MU: mu, "µ static": static})
+    order, _ = rivals_sentences("stickiness", rivals)
+    assert order.startswith("Stickiness: µ of the model orders these 4 surfaces as the SED does, so")
+    assert "static" not in order
+
+
+def test_a_single_rival_is_one_rival():
+    contrast_of_one = Contrast(5, 0.9, 0.5, 1.2, 3.0, 0.003)
+    rivals = (Rival(MODEL_SED, 5, 0.9, None, None), Rival("N", 5, 0.0, None, None, contrast_of_one))
+    assert rivals_sentences("stickiness", rivals)[-1].endswith("(p < 0.05 by Holm over 1 rival).")
+
+
 def people(draw, judge, subjects=10):
     """Return trials of people who judge five surfaces by `judge(µ, SED)`; the SED bends against µ."""
     trials = []

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from textwrap import fill
 
 from sessions.report.tables import Row, Table, estimate_cell, number_cell, table
-from sessions.report.wording import NONE, capital, correlation, digits, p_value, places
+from sessions.report.wording import NONE, capital, correlation, digits, p_value, places, plural
 from sessions.statistics.correlations import POWER
 from sessions.statistics.rivals import RESPONSES, Rival
 from sessions.statistics.scores import bounds
@@ -78,7 +78,7 @@ def _alike(name: str, model: str, rivals: Sequence[Rival]) -> list[str]:
     figures = {_two_figures(count): name for count, name in (*counts[-1:], *counts[:1])}
     figure_texts = [f"{figure} ({name})" for figure, name in reversed(figures.items())]
     opening = (
-        f"{capital(name)}: {names} {order} these {alike[0].n} surfaces as the {model} does, so no order "
+        f"{capital(name)}: {names} {order} these {rivals[0].n} surfaces as the {model} does, so no order "
         f"of scores can distinguish {them} from it; "
     )
     if not figure_texts:
@@ -100,7 +100,9 @@ def _verdict(name: str, model: str, rivals: Sequence[Rival]) -> str:
     ]
     sentences: list[str] = []
     if clauses:
-        sentences.append(f"the scores follow {' and '.join(clauses)} (p < 0.05 by Holm over {len(adjusted)} rivals)")
+        sentences.append(
+            f"the scores follow {' and '.join(clauses)} (p < 0.05 by Holm over {plural(len(adjusted), 'rival')})"
+        )
     if sides["neither"]:
         subject = "they" if clauses else "the scores"
         sentences.append(f"{subject} do not distinguish the {model} from {_rival_names(sides['neither'])}")

@@ -266,8 +266,9 @@ def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:
     distinct = summary.distinct
     difference = "all agree within" if distinct == 1 else f"{distinct} of these differ by more than"
     least, median, greatest = map(correlation, (summary.least, summary.median, summary.greatest))
+    level = "over surfaces" if all(finding.within is None for finding in findings) else "within subjects"
     return (
-        f"{start} {summary.correlated} give a correlation, from {least} to {greatest}, "
+        f"{start} {summary.correlated} give a correlation {level}, from {least} to {greatest}, "
         f"median {median}{sign_clause}; {difference} {SAME:g}."
     )
 
