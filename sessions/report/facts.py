@@ -220,7 +220,7 @@ def remarks(recording: Recording, analysis: Analysis, tables: Sequence[ScoreTabl
             sentences.append(f"Trial {number} was not done: the session ended before.")
     sentences += [
         f"The {descriptor} scores of {subject} fall as the index rises (r = {correlation(r)}): the scale may have been "
-        "used backwards; they are kept as given."
+        "used backwards, or they may follow no order; they are kept as given."
         for subject, descriptor, r in reversed_subjects(tables)
     ]
     return tuple(sentences)

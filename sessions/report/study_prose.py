@@ -91,10 +91,14 @@ def _relation_sentences(findings: DescriptorFindings, study: StudyFindings) -> l
     if repeated.people is not None:
         low, high = map(correlation, repeated.people)
         interval = f"95 % interval for other people on these surfaces {low} to {high}"
+    falling = sum(descriptor == findings.descriptor for _, descriptor, _ in study.reversed)
+    scorers = plural(len(findings.answers), "subject")
+    reversals = [f"The scores of {falling} of {scorers} fall as the index rises; the appendix names each."]
     return [
         f"{name}: within subjects, score and the {label} predicted at {strain} strain go together by "
         f"r = {correlation(repeated.r)} over {plural(len(findings.points), 'trial')}, {interval}; "
-        f"{_otherwise(findings, other_strain)}."
+        f"{_otherwise(findings, other_strain)}.",
+        *(reversals if falling else []),
     ]
 
 
@@ -185,7 +189,7 @@ def remarks(study: StudyFindings) -> list[str]:
     ]
     sentences += [
         f"The {descriptor} scores of {subject} fall as the index rises (r = {correlation(r)}); the scale may have been "
-        "used backwards."
+        "used backwards, or these scores may follow no order."
         for subject, descriptor, r in study.reversed
     ]
     return [*sentences, *_meshes(study)]

@@ -181,7 +181,7 @@ def z_scores(table: Table) -> dict[str, dict[int, float]]:
     stimuli = len({index for row in table.values() for index in row})
     for subject, row in table.items():
         values = np.array(list(row.values()))
-        if len(values) == stimuli > 1 and float(np.ptp(values)) > 0.0:
+        if len(values) == stimuli > 1 and float(np.ptp(values)) > 1e-12 * float(np.abs(values).max()):
             mean, spread = float(values.mean()), float(values.std(ddof=1))
             rows[subject] = {index: (score - mean) / spread for index, score in row.items()}
     return rows

@@ -109,6 +109,7 @@ def test_of_two_stimuli_the_interval_within_is_the_paired_one_over_the_root_of_t
 def test_scores_that_are_equal_but_for_round_off_tie_and_do_not_vary():
     third = float(np.mean([0.1, 0.2, 0.3]))  # 0.20000000000000004
     assert z_scores({"flat": {0: 0.1, 50: 0.1, 100: 0.1}}) == {}  # the mean of three times 0.1 is not 0.1
+    assert z_scores({"repeats": {0: float(np.mean([33.3] * 6)), 50: 33.3, 100: 33.3}}) == {}
     assert differences({"A": {0: 0.1, 50: 0.2}, "B": {0: 0.2, 50: 0.3}, "C": {0: 0.3, 50: 0.4}}) == ()
     near, exact = ({k: {0: a, 50: 0.2, 100: 0.1 * int(k)} for k in "1234"} for a in (third, 0.2))
     assert agreement(near) == agreement(exact)
