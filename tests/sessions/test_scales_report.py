@@ -128,10 +128,10 @@ def test_a_subject_with_an_estimate_of_zero_counts_for_no_exponent_and_for_no_la
     for _, trial in trials:
         trial.score = None
     zero = [(visit, trial) for visit, trial in trials if visit.subject == "P0"]
-    others = [(visit, trial) for visit, trial in trials if visit.subject != "P0"]
+    other_trials = [(visit, trial) for visit, trial in trials if visit.subject != "P0"]
     zero[0][1].estimate = 0.0
-    assert exponent(trials) == exponent(others)
-    assert latent_scales(trials, (), None) == latent_scales(others, (), None)
+    assert exponent(trials) == exponent(other_trials)
+    assert latent_scales(trials, (), None) == latent_scales(other_trials, (), None)
 
 
 def logs(*ratios):
