@@ -93,10 +93,11 @@ def _relation_sentences(findings: DescriptorFindings, study: StudyFindings) -> l
         interval = f"95 % interval for other people on these surfaces {low} to {high}"
     falling = sum(descriptor == findings.descriptor for _, descriptor, _ in study.reversed)
     scorers = plural(len(findings.answers), "subject")
+    people = plural(len({subject for subject, *_ in findings.points}), "subject")
     reversals = [f"The scores of {falling} of {scorers} fall as the index rises; the appendix names each."]
     return [
         f"{name}: within subjects, score and the {label} predicted at {strain} strain go together by "
-        f"r = {correlation(repeated.r)} over {plural(len(findings.points), 'trial')}, {interval}; "
+        f"r = {correlation(repeated.r)} over {plural(len(findings.points), 'trial')} of {people}, {interval}; "
         f"{_otherwise(findings, other_strain)}.",
         *(reversals if falling else []),
     ]

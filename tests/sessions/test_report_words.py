@@ -72,6 +72,13 @@ def test_the_usual_path_has_the_strain_of_the_report_s_prediction():
     assert not [path for path in at_finite if path.usual]
 
 
+def test_a_usual_path_without_a_correlation_is_told(report):
+    """At finite strain the usual path may leave too few surfaces, while those at small strain do not."""
+    first, *small_paths = [replace(path, within=None, usual=False) for path in report.experiments[0].paths]
+    sentence = paths_sentence("stickiness", [replace(first, r=None, usual=True), *small_paths])
+    assert ", none on the usual path; " in sentence
+
+
 def test_paths_say_which_correlation_they_give(report):
     over_surfaces = [replace(path, within=None) for path in report.experiments[0].paths]
     assert " give a correlation over surfaces, from " in paths_sentence("stickiness", over_surfaces)

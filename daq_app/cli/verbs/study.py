@@ -79,8 +79,8 @@ def print_power(options: argparse.Namespace, console: Console) -> int:
     console.say(
         f"Assumed: {values}. We chose the default values; nobody measured them.",
         table(rows, header=["subjects", *(f"{count} surfaces" for count in SURFACES)]),
-        "Share of simulated studies whose correlation within subjects has p < 0.05 for other people on the same "
-        f"surfaces, of {options.studies} each. They hold for these surfaces, not for others.",
+        "Share of simulated studies whose correlation of scores with µ within subjects has p < 0.05 for other people "
+        f"on the same surfaces, of {options.studies} each. They hold for these surfaces, not for others.",
     )
     if recoveries:
         _print_recovery(recoveries, options, console)

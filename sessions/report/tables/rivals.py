@@ -22,7 +22,8 @@ RivalGroups = Sequence[tuple[str, Sequence[Rival]]]  # name of a group, and its 
 def rival_tables(groups: RivalGroups, quantity: str, model: str) -> tuple[Table | None, Table | None]:
     """Return tables of measured rivals of a quantity of the `model`, and of the model's other quantities."""
     within = "Steiger (1980), within subjects by the jackknife" if _have_weights(groups) else "Steiger (1980)"
-    aic = "AIC: crossed mixed models. " if _have_weights(groups) else ""
+    levels = "AIC: mixed models with levels of subjects and surfaces, which take up part of what surfaces differ in. "
+    aic = levels if _have_weights(groups) else ""
     texts = {"label": quantity, "model": model, "within": within, "aic": aic}
     return (
         _table("rivals", groups, texts, lambda name: name == quantity or name not in RESPONSES),

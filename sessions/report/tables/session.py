@@ -257,12 +257,15 @@ def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:
     """Return a sentence on the distribution of the correlation, and the number of paths with the opposite sign."""
     values = correlations(findings)
     summary = five_number_summary(values)
-    usual = next((r for r, finding in zip(values, findings, strict=True) if finding.usual and r), 0.0)
+    usual_values = [r for r, finding in zip(values, findings, strict=True) if finding.usual]
+    usual = next((r for r in usual_values if r), 0.0)
     start = f"{capital(name)}: of {len(findings)} paths of the analysis"
     if summary is None:
         return f"{start} none gives a correlation."
     opposite_count = sum(r is not None and r * usual < 0.0 for r in values)
     sign_clause = f", {opposite_count} with another sign than the usual path" if opposite_count else ""
+    if None in usual_values:
+        sign_clause = ", none on the usual path"
     distinct = summary.distinct
     difference = "all agree within" if distinct == 1 else f"{distinct} of these differ by more than"
     least, median, greatest = map(correlation, (summary.least, summary.median, summary.greatest))
