@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from solver.arrays import Array
 from solver.continuation import critical_stretch
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import Finger, FiniteFinger, finite_laws, settled_moduli
@@ -65,18 +64,13 @@ def _check_cut(finger: FiniteFinger, state: EquilibriumState) -> bool:
     outer = columns[[0, 1, -2, -1]].ravel()  # in the outer columns of the mesh that this one divides
     F = finger.body.deformation(state.u).reshape(len(mesh.elements), -1, 2, 2)[outer]
     least = np.linalg.svd(F, compute_uv=False)[..., -1].min(axis=1)
-    folds = _critical_stretches(finger.scene.materials)[mesh.region[outer]]
+    laws = finite_laws(finger.scene.materials)
+    folds = np.array([critical_stretch(laws[region]) for region in mesh.region[outer]])
     ends = (least < folds).reshape(2, -1).sum(axis=1)
     if ends.max() > 1:
         worst = int((least - folds).argmin())
         raise cut_folds(float(least[worst]), float(folds[worst]))
     return bool(ends.any())
-
-
-@lru_cache(maxsize=8)
-def _critical_stretches(materials: Materials) -> Array:
-    """Return the stretch at which a free face folds by region [-]."""
-    return np.array([critical_stretch(law) for law in finite_laws(materials)])
 
 
 _ROUND_OFF = 1e-12  # relative, of a stiffness

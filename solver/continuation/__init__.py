@@ -17,9 +17,8 @@ from functools import lru_cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from solver.arrays import Array
+from solver.arrays import Array, Flags
 from solver.body.skin import SkinCompression
 from solver.constitutive import Law, stress, tangent
 from solver.contact import LoadState
@@ -290,10 +289,9 @@ def jumped_branch(body: BranchBody, before: EquilibriumState, after: Equilibrium
     )
 
 
-Waves = NDArray[np.complex128]
-_STEP = 0.01  # step of the stretch in the search for the loss of stability
-_LEAST = 0.05  # smallest stretch of that search
-HALVINGS = 40  # of the last step of that search
+_LEAST = 0.05  # smallest stretch of the search for the loss of stability
+_TRIALS = 90  # stretches tried at once: every 0.01 at first
+_ACCURACY = 1e-9  # of that stretch; round-off hides more in tissue that hardly changes its volume
 
 
 @lru_cache(maxsize=16)
@@ -306,45 +304,46 @@ def critical_stretch(law: Law) -> float:
     >>> round(critical_stretch(NeoHooke(1.0, 0.4999999)), 4)
     0.5437
     """
-    high = 1.0 - 5.0 * _STEP
-    while high > _LEAST and _stable(law, high - _STEP):
-        high -= _STEP
-    if high <= _LEAST:
-        return _LEAST
-    low = high - _STEP
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2.0
-        low, high = (low, middle) if _stable(law, middle) else (middle, high)
+    high, low = 0.95, _LEAST  # isotropic tissue is stable at small strain
+    while high - low > _ACCURACY:
+        stretches = np.linspace(high, low, _TRIALS + 1)
+        lost = np.flatnonzero(~_stable(law, stretches[1:]))
+        if not len(lost):
+            return _LEAST
+        high, low = stretches[lost[0] : lost[0] + 2].tolist()
     return high
 
 
-def _stable(law: Law, stretch: float) -> bool:
-    """Return whether the surface impedance is positive definite at a stretch along a traction-free surface."""
+def _stable(law: Law, stretch: Array) -> Flags:
+    """Return whether the surface impedance is positive definite at stretches (n,) along a traction-free surface."""
     across = 1.0 / stretch
     for _ in range(50):
-        F = np.diag([stretch, across])
-        step = float(stress(law, F)[1, 1] / tangent(law, F)[1, 1, 1, 1])
+        F = _diagonal(stretch, across)
+        step = stress(law, F)[:, 1, 1] / tangent(law, F)[:, 1, 1, 1, 1]
         across -= step
-        if abs(step) < 1e-14 * across:
+        if np.all(np.abs(step) < 1e-14 * across):
             break
-    moduli = tangent(law, np.diag([stretch, across]))
-    impedance = _impedance(moduli[:, 0, :, 0], moduli[:, 0, :, 1], moduli[:, 1, :, 1])
-    return impedance is not None and float(np.linalg.det(impedance).real) > 0.0
+    moduli = tangent(law, _diagonal(stretch, across))
+    return _has_positive_impedance(moduli[:, :, 0, :, 0], moduli[:, :, 0, :, 1], moduli[:, :, 1, :, 1])
 
 
-def _impedance(along: Array, mixed: Array, across: Array) -> Waves | None:
-    """Return the impedance (2, 2) of waves exp(i (X + p Y)) that decay with depth; None unless there are two.
+def _diagonal(x: Array, y: Array) -> Array:
+    """Return the deformation gradients (n, 2, 2) of stretches x and y (n,)."""
+    return np.stack([x, y], axis=1)[:, :, None] * np.eye(2)
 
-    `along`, `mixed`, `across` (2, 2) are the moduli dP_aA/dF_bB with A, B = X, X; X, Y; Y, Y.
+
+def _has_positive_impedance(along: Array, mixed: Array, across: Array) -> Flags:
+    """Return whether two waves exp(i (X + p Y)) decay with depth, and their impedance has a positive determinant.
+
+    `along`, `mixed`, `across` (n, 2, 2) are the moduli dP_aA/dF_bB with A, B = X, X; X, Y; Y, Y.
     """
-    inverse = np.linalg.inv(across)
-    system = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ along, -inverse @ (mixed + mixed.T)]])
-    eigen = np.linalg.eig(system.astype(np.complex128))
-    p: Waves = np.asarray(eigen[0], np.complex128)
-    waves: Waves = np.asarray(eigen[1], np.complex128)
-    decay = p.imag > 0.0
-    if decay.sum() != 2:
-        return None
-    shapes = waves[:2, decay]
-    tractions = mixed.T @ shapes + across @ shapes * p[decay]
-    return -1j * tractions @ np.linalg.inv(shapes)
+    inverse, transpose = np.linalg.inv(across), np.swapaxes(mixed, 1, 2)
+    system = np.zeros((len(along), 4, 4), np.complex128)
+    system[:, :2, 2:] = np.eye(2)
+    system[:, 2:, :2], system[:, 2:, 2:] = -inverse @ along, -inverse @ (mixed + transpose)
+    p, waves = np.linalg.eig(system)
+    deepest = np.argsort(-p.imag, axis=1)[:, None, :2]
+    shapes = np.take_along_axis(waves[:, :2], deepest, axis=2)
+    tractions = transpose @ shapes + across @ shapes * np.take_along_axis(p[:, None], deepest, axis=2)
+    determinants = -np.linalg.det(tractions) / np.linalg.det(shapes)  # of -i tractions / shapes
+    return ((p.imag > 0.0).sum(axis=1) == 2) & (determinants.real > 0.0)
