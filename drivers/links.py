@@ -2,9 +2,7 @@
 
 import contextlib
 import io
-import os
 import re
-import select
 import socket
 import threading
 from collections.abc import Generator
@@ -57,57 +55,6 @@ class UdpLink:
             return None
         except OSError as error:
             raise LinkLost(f"cannot receive from {self._location}: {_reason(error)}; check the network cable") from None
-
-    def close(self) -> None:
-        self._socket.close()
-
-
-class TcpLink:
-    """A stream of bytes to and from one TCP port of an IP address."""
-
-    def __init__(self, address: str, port: int, deadline: Deadline) -> None:
-        """Connect by the deadline. Raises LinkLost, Stopped."""
-        self._location = f"{address}, TCP port {port}"
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        with contextlib.ExitStack() as stack:
-            stack.callback(self._socket.close)
-            try:
-                self._connect(address, port, deadline)
-            except OSError as error:
-                reason = _reason(error)
-                raise LinkLost(f"nothing answers at {self._location}: {reason}; check power, cable and port") from None
-            stack.pop_all()  # leaves the connection open
-
-    def _connect(self, address: str, port: int, deadline: Deadline) -> None:
-        """Connect by the deadline, or until a stop. Raises OSError, LinkLost, Stopped."""
-        self._socket.settimeout(0.0)
-        with contextlib.suppress(BlockingIOError):
-            self._socket.connect((address, port))
-        while not any(select.select([], [self._socket], [self._socket], TICK)):
-            deadline.check()
-        if error := self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR):
-            raise OSError(error, os.strerror(error))
-
-    def send(self, data: bytes) -> None:
-        try:
-            self._socket.settimeout(TICK)
-            self._socket.sendall(data)
-        except OSError as error:
-            raise LinkLost(f"cannot send to {self._location}: {_reason(error)}; check the network cable") from None
-
-    def receive(self, timeout: float) -> bytes | None:
-        try:
-            self._socket.settimeout(timeout)
-            data = self._socket.recv(65536)
-        except (TimeoutError, BlockingIOError):
-            return None
-        except OSError as error:
-            raise LinkLost(f"cannot receive from {self._location}: {_reason(error)}; check the network cable") from None
-        if not data:
-            raise LinkLost(
-                f"{self._location} ended the connection; check its power, and end other programs that use it"
-            )
-        return data
 
     def close(self) -> None:
         self._socket.close()

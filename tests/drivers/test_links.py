@@ -1,12 +1,12 @@
-"""Ports of this computer: datagrams, one stream of bytes, and one web page."""
+"""Ports of this computer: datagrams, and one web page."""
 
 import socket
 import threading
 
 import pytest
 
-from drivers.deadline import Deadline, Stopped
-from drivers.links import MOST_BODY, HttpAnswer, TcpLink, UdpLink, http_get, resolve
+from drivers.deadline import Deadline
+from drivers.links import MOST_BODY, HttpAnswer, UdpLink, http_get, resolve
 from drivers.transducer import LinkLost, SetupError
 
 
@@ -98,45 +98,6 @@ def test_a_silent_server_is_given_up_at_the_deadline(serve):
 def test_a_port_nobody_serves_is_a_lost_link():
     with pytest.raises(LinkLost, match="connection refused"):
         get(1)
-
-
-def test_a_stream_goes_both_ways_and_its_end_is_a_lost_link(serve):
-    link = TcpLink("127.0.0.1", serve(b"1,2\n"), Deadline(5.0))
-    assert link.receive(0.0) is None
-    assert link.receive(0.01) is None
-    link.send(b"go")
-    assert link.receive(5.0) == b"1,2\n"
-    with pytest.raises(LinkLost, match="ended the connection"):
-        link.receive(5.0)
-    link.close()
-    link.close()
-
-
-def test_a_stream_from_a_port_that_nobody_serves_is_a_lost_link():
-    with pytest.raises(LinkLost, match="TCP port 1: connection refused"):
-        TcpLink("127.0.0.1", 1, Deadline(5.0))
-
-
-@pytest.fixture
-def full_port():
-    """A port that answers no further call: its queue is full."""
-    listener = socket.create_server(("127.0.0.1", 0), backlog=0)
-    calls = [socket.socket() for _ in range(3)]
-    for call in calls:
-        call.setblocking(False)
-        call.connect_ex(listener.getsockname())
-    yield listener.getsockname()[1]
-    for opened_socket in (listener, *calls):
-        opened_socket.close()
-
-
-def test_a_stream_from_a_silent_host_is_given_up_at_the_deadline_or_at_a_stop(full_port):
-    with pytest.raises(LinkLost, match="not ready within"):
-        TcpLink("127.0.0.1", full_port, Deadline(0.1))
-    stopping = threading.Event()
-    stopping.set()
-    with pytest.raises(Stopped):
-        TcpLink("127.0.0.1", full_port, Deadline(60.0, stopping))
 
 
 @pytest.fixture
