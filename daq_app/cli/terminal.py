@@ -264,7 +264,7 @@ class _Attendance:
             case m.Failed() if self._stopping and self._start is None:
                 raise KeyboardInterrupt  # as requested, before anything was recorded
             case m.Failed() | m.Gone():
-                _raise_failure(report)
+                _raise_failure(report, "" if self._start is None else self._start.folder)
             case _ if isinstance(report, Command) and self._terminal is not None:
                 self._terminal.show(report)
         return None
@@ -278,8 +278,10 @@ class _Attendance:
             self._console.progress(fraction, f"{subject}: {status.state}, {status.safe.readings} readings safe")
 
 
-def _raise_failure(report: m.Report) -> None:
-    """Raise the failure in a report as the exception that the command line expects."""
-    if isinstance(report, m.Failed | m.Gone):
-        kind = report.kind if isinstance(report, m.Failed) else ""
-        raise _FAILURES.get(kind, RecordingError)(report.sentence)
+def _raise_failure(report: m.Report, folder: str = "") -> None:
+    """Raise the failure in a report, of a session in `folder` if any, as the command line expects it."""
+    match report:
+        case m.Failed(_, sentence, kind):
+            raise _FAILURES.get(kind, RecordingError)(sentence)
+        case m.Gone(_, sentence):
+            raise RecordingError(f"{sentence}, with 'daq-app resume {folder}'" if folder else sentence)

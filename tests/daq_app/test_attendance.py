@@ -84,3 +84,8 @@ def test_a_failure_of_the_recorder_is_that_of_the_command_line(report, error):
         open_device(ScriptedRecorder(([report], 0.0)), "sim:")
     with pytest.raises(error, match=sentence):
         attend(([report], 0.0))
+
+
+def test_a_recorder_that_ends_during_a_session_leaves_a_sentence_that_names_its_folder():
+    with pytest.raises(RecordingError, match="resume the session, with 'daq-app resume here'"):
+        attend(([BEGUN], 0.0), ([m.Gone(False, "resume the session")], 0.0))
