@@ -41,6 +41,7 @@ _TIES = re.compile(
     r"(?<=\d) (?=(?:[%°]|[mkµM]?(?:N|Pa|Hz|m|s|B)[²³]?)(?!\w))|(?<=N) (?=mm\b)|(?<=[µ±×≤τ]) (?=[\d−–m])"
     r"|(?<=\d) (?=of \d)|(?<=\d of) (?=\d)| (?=·)"
 )
+_LONG, _TEN = re.compile(r"[^\s/]{30,}"), re.compile(".{10}")  # word, and its parts
 
 
 def breakable(text: str) -> str:
@@ -48,8 +49,10 @@ def breakable(text: str) -> str:
 
     >>> breakable("µ 0.43, 2 N mm · 10 % of 3 trials, 5 of 10").split(" ")
     ['µ\xa00.43,', '2\xa0N\xa0mm\xa0·', '10\xa0%', 'of', '3', 'trials,', '5\xa0of\xa010']
+    >>> breakable(f"subject {'W' * 32}").split("\u200b")
+    ['subject WWWWWWWWWW', 'WWWWWWWWWW', 'WWWWWWWWWW', 'WW']
     """
-    return re.sub(r"[^\s/]{30}", "\\g<0>\u200b", _TIES.sub("\u00a0", text))
+    return _LONG.sub(lambda word: _TEN.sub("\\g<0>\u200b", word[0]), _TIES.sub("\u00a0", text))
 
 
 def whole_facts(row: str) -> str:
