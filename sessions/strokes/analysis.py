@@ -210,8 +210,16 @@ def preview(recording: Recording, decision: Decision, decisions: Decisions, pres
     present_sentences = {flaw.sentence for flaw in present.flaws}
     for flaw in changed.flaws:
         if flaw.name is FlawName.DECISION and flaw.sentence not in present_sentences and decision.undoes is None:
-            raise DecisionError(flaw.sentence)
+            raise DecisionError(f"{flaw.sentence}{_extent(present, decision)}")
     return changed
+
+
+def _extent(analysis: Analysis, decision: Decision) -> str:
+    """Return a sentence with the ends of a decision's stroke; empty where they are not known."""
+    for stroke in analysis.strokes:
+        if (stroke.trial, stroke.number) == (decision.trial, decision.stroke) and stroke.onset and stroke.lift:
+            return f" The stroke lasts from {stroke.onset:.3f} to {stroke.lift:.3f} s."
+    return ""
 
 
 # Settings missing in documents of older programs: the first four not drawn before 2026-11-23, the others not stored

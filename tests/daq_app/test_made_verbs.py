@@ -257,6 +257,7 @@ def test_a_decision_is_recorded_listed_followed_by_every_verb_and_undone(small, 
     [
         (["--trial", "1", "--drop", "--by", "E02"], 2, "give --by CODE and --why REASON"),
         (["--trial", "1", "--steady", "900", "901", "--by", "E02", "--why", "w"], 2, "too few readings"),
+        (["--trial", "1", "--steady", "900", "901", "--by", "E02", "--why", "w"], 2, "The stroke lasts from "),
         (["--trial", "44", "--drop", "--by", "E02", "--why", "w"], 2, "there is no stroke 1 of trial 44"),
         (["--choose", "--by", "E02", "--why", "w"], 2, "give --trial N"),
         (["--trial", "1", "--steady", "5", "1", "--by", "E02", "--why", "w"], 2, "the earlier first"),
