@@ -89,11 +89,12 @@ def check_design(design: Mapping[str, Any], scene: Scene, file: str) -> dict[str
         if not -math.inf < low < high < math.inf:
             form = "[least, greatest], least below greatest"
             raise SettingsError(f"{file}: {name} = {toml_value(span)} is not allowed: {form}")
-        try:
-            for limit in (low, high):
+        for limit in (low, high):
+            try:
                 with_values(scene, {name: limit})
-        except SceneError as error:
-            raise SettingsError(f"{file}: {error}") from error
+            except SceneError as error:
+                place = "" if str(error).startswith(name) else f"with {name} = {limit:g}, "
+                raise SettingsError(f"{file}: {place}{error}") from error
         ranges[name] = (low, high)
     if len(ranges) < 2:
         raise SettingsError(f"{file}: a design needs two numbers at least")

@@ -110,6 +110,7 @@ def test_what_cannot_be_varied_is_named():
         ({"friction.mu": [0.5, 0.5]}, "friction.mu"),
         ({"friction.mu": [0.5, 10**400]}, r"friction.mu = \[0.5, 1000"),
         ({"friction.mu": [-1.0, 0.5]}, "design.toml: friction.mu = -1.0 is not allowed"),
+        ({"finger.tip_radius": [4.0, 6.0]}, "design.toml: with finger.tip_radius = 4, finger.bone_centre = "),
     ):
         with pytest.raises(SettingsError, match=what):
             check_design(wrong, SCENE, "design.toml")

@@ -2,7 +2,7 @@
 
 With a scene: which of its numbers affect its SED. Without --design, geometry, stiffness, depth, angle and friction
 vary around the scene's own values, by ranges that are assumed, not measured; they are printed with the result. A
-design is a TOML file: "finger.tip_radius" = [4.0, 6.5] and so on.
+design is a TOML file: "finger.tip_radius" = [5.0, 6.5] and so on.
 
 Without a scene: whether a response at the receptor rises or falls over the published surfaces, and on which fingers it
 keeps that sign: single changes, a map over the receptor's place and the tip radius, and fingers drawn at random.
