@@ -57,6 +57,8 @@ def test_the_verb_simulates_studies_at_the_depths_asked_for(capsys, monkeypatch)
     assert (document["people"], document["surfaces"], document["depths"]) == (4, 3, [1.25, 1.75])
     assert (document["planted"], document["preferred"]) == ("shear_along_skin", 1.0)
     assert run(easy) == 0
-    assert "4 × 3 × 2" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "effect = 80 points, noise = 1 points, level_sd = 12 points, slope_sd = 0 of the effect" in printed
+    assert "4 × 3 × 2" in printed
     assert run([*easy, "9"]) == 2
     assert "--depths" in capsys.readouterr().err

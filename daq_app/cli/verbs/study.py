@@ -45,6 +45,12 @@ from sessions.strokes.stroke import FIXED
 _SUBJECTS, SURFACES = (3, 5, 10, 15, 20, 30), (3, 5, 8, 12)  # of the designs whose power is simulated
 # Of the designs that should distinguish quantities: one such study takes a thousand times as long.
 RIVAL_SUBJECTS, RIVAL_SURFACES, RIVAL_STUDIES = (12, 24), (5, 8), 40
+# Of the assumptions; a point is one of the 100 of the score.
+_UNITS = {
+    **dict.fromkeys(("effect", "noise", "level_sd"), "points"),
+    "slope_sd": "of the effect",
+    "friction_sd": "of µ",
+}
 
 
 def add_power(parser: argparse.ArgumentParser) -> None:
@@ -75,7 +81,7 @@ def print_power(options: argparse.Namespace, console: Console) -> int:
         [str(count), *(_share_text(row.share, row.studies) for row in powers if row.subjects == count)]
         for count in _SUBJECTS
     ]
-    values = ", ".join(f"{name} = {value:g}" for name, value in asdict(effects).items())
+    values = ", ".join(f"{name} = {value:g} {_UNITS[name]}" for name, value in asdict(effects).items())
     console.say(
         f"Assumed: {values}. We chose the default values; nobody measured them.",
         table(rows, header=["subjects", *(f"{count} surfaces" for count in SURFACES)]),
