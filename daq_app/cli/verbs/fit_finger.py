@@ -107,9 +107,9 @@ def _curves(options: argparse.Namespace, recording: Recording, settings: Analysi
     shift = options.shift * (1e9 if log.clock == "received_ns" else 1.0)
     curves = press_curves(recording, replace(log, instants=log.instants + shift), settings)
     if not curves.presses:
-        reason = curves.left_out[0] if curves.left_out else "It holds no press."
+        reason = f" {curves.left_out[0]}" if curves.left_out else ""
         raise FitError(
-            f"{recording.folder} holds no press that {options.displacement} covers. {reason} Press straight down, "
+            f"{recording.folder} holds no press that {options.displacement} covers.{reason} Press straight down, "
             "hold for half a second without a slide, and log on the session's clock."
         )
     return curves
