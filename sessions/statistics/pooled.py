@@ -174,7 +174,8 @@ def _model(trials: Sequence[tuple[str, TrialRow, float]], quantity: Quantity, *t
     """
     count = len({subject for subject, _, _ in trials})
     if count < 3:
-        requirement = "scores" if terms == (INDEX,) else "scores and strokes of their own"
+        requirements = {(INDEX,): "scores", (INDEX, FRICTION): "scores and a µ of their own"}
+        requirement = requirements.get(terms, f"scores and a predicted {quantity.label}")
         count_text = "there is 1" if count == 1 else f"there are {count or 'none'}"
         return f"it takes three subjects with {requirement}, and {count_text}"
     subjects, rows, scores = zip(*trials, strict=True)

@@ -10,7 +10,7 @@ from scipy import special
 
 from drivers.arrays import Array
 from sessions.statistics.correlations import LEAST_CASES, jackknife, t_quantile
-from sessions.statistics.scores import average, bounds
+from sessions.statistics.scores import average, bounds, surface_means
 
 Table = Mapping[str, Mapping[int, float]]  # subject -> the stimulus's index -> score, from `scores.score_matrix`
 
@@ -188,13 +188,17 @@ def z_scores(table: Table) -> dict[str, dict[int, float]]:
 
 
 def equal_moduli(logs: Table) -> dict[str, dict[int, float]]:
-    """Return logarithms of free-modulus estimates, shifted so that all subjects have the grand mean.
+    """Return logarithms of free-modulus estimates, shifted so that all subjects have the same level.
 
-    With a free modulus each subject chooses a unit (Stevens 1957, Psychol. Rev. 64:153).
+    With a free modulus each subject chooses a unit (Stevens 1957, Psychol. Rev. 64:153). A subject's level is its mean
+    difference from the means of its surfaces (`surface_means`), so one who missed a surface keeps its unit.
     """
-    means = {subject: float(np.mean(list(row.values()))) for subject, row in logs.items()}
-    grand = float(np.mean(list(means.values()))) if means else 0.0
-    return {
-        subject: {index: value - means[subject] + grand for index, value in row.items()}
-        for subject, row in logs.items()
-    }
+    means = surface_means([(subject, index, value) for subject, row in logs.items() for index, value in row.items()])
+    if means is None:  # no subjects connect the surfaces
+        grand = float(np.mean([np.mean(list(row.values())) for row in logs.values()])) if logs else 0.0
+        means = dict.fromkeys((index for row in logs.values() for index in row), grand)
+    shifted: dict[str, dict[int, float]] = {}
+    for subject, row in logs.items():
+        level = float(np.mean([value - means[index] for index, value in row.items()]))
+        shifted[subject] = {index: value - level for index, value in row.items()}
+    return shifted

@@ -96,7 +96,7 @@ def test_visits_that_only_scored_give_means_and_no_relation():
     finding = pool_visits([visit(number, sed=None) for number in range(1, 5)]).descriptors[0]
     assert finding.mean_relation is None
     assert finding.repeated is None
-    assert "three subjects with scores and strokes of their own" in finding.on_response
+    assert "three subjects with scores and a predicted SED, and there are none" in finding.on_response
     assert [mean.n for mean in finding.scores] == [4] * 5
 
 

@@ -168,6 +168,19 @@ def test_where_nothing_can_be_said_nothing_is():
     assert agreement({}) is None
 
 
+def test_a_subject_who_missed_a_surface_keeps_its_modulus():
+    """Of an exact law of power all subjects agree at one modulus, and ratios of surfaces are those of the law."""
+    law, moduli = {0: 0.24, 50: 0.44, 100: 0.67}, {"a": 2.0, "b": 7.0, "c": 40.0}
+    logs = {
+        name: {i: math.log(modulus * mu**1.5) for i, mu in law.items() if (name, i) != ("c", 100)}
+        for name, modulus in moduli.items()
+    }
+    equal = equal_moduli(logs)
+    assert [row[0] for row in equal.values()] == pytest.approx([equal["a"][0]] * 3)
+    assert equal["c"][50] - equal["c"][0] == pytest.approx(1.5 * math.log(0.44 / 0.24))
+    assert equal["a"][0] == pytest.approx(1.5 * math.log(0.24) + np.mean(np.log(list(moduli.values()))))
+
+
 def test_standardised_scores_have_no_level_and_equal_moduli_keep_ratios():
     table = {"a": {0: 10.0, 1: 20.0, 2: 40.0}, "b": {0: 1.0, 1: 2.0, 2: 4.0}, "flat": {0: 5.0, 1: 5.0}}
     z = z_scores(table)
