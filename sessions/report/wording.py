@@ -112,11 +112,13 @@ def ends_of(relation: Relation) -> str:
 
 
 def spread_share(low: float, high: float) -> str:
-    """Return a range as a share of the middle of its ends.
+    """Return a range as a share of the middle of its ends; across 0 it may be any share above 200 %.
 
-    >>> spread_share(5.185, 5.3575)
-    '3.3 %'
+    >>> spread_share(5.185, 5.3575), spread_share(-0.3, 0.1), spread_share(-0.2, 0.2)
+    ('3.3 %', 'more than 200 %', 'more than 200 %')
     """
+    if low < 0.0 < high:
+        return "more than 200 %"
     middle = abs(high + low)
     return f"{significant(200 * (high - low) / middle, 2)} %" if middle else "about 0"
 
