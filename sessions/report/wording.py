@@ -105,9 +105,9 @@ def correlation(r: float) -> str:
 
 
 def ends_of(relation: Relation) -> str:
-    """Return the 95 % interval of a correlation as the end of a sentence, "" without one."""
+    """Return the 95 % interval of a correlation, or why it has none, as the end of a sentence."""
     if relation.low is None or relation.high is None:
-        return ""
+        return f", {relation.reason}" if relation.reason else ""
     return f", 95 % interval {correlation(relation.low)} to {correlation(relation.high)}"
 
 

@@ -14,6 +14,7 @@ from drivers.arrays import Array
 CONFIDENCE = 0.95
 TAILS = ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2)  # probabilities of the ends of an interval
 LEAST_CASES = 3  # of a jackknife
+LEAST_OF_STEIGER = 4  # cases of Steiger's test
 _EXACT_UP_TO = 7  # 7! = 5040 orders are enumerated
 
 POWER = 0.8  # required to distinguish two correlations (Cohen 1988, p. 56)
@@ -175,7 +176,7 @@ def steiger_z(first: float, second: float, mutual: float, n: int) -> float | Non
     perfect correlation, or two variables equal up to scale.
     """
     error = _pooled_variance(first, second, mutual)
-    if n < 4 or error is None:
+    if n < LEAST_OF_STEIGER or error is None:
         return None
     return (math.atanh(first) - math.atanh(second)) * math.sqrt((n - 3) / error)
 

@@ -61,7 +61,8 @@ class Rival:
     weight: float | None = None  # Akaike's, of the mixed model with subjects and surfaces crossed
     # Orders the surfaces as the model's quantity, or exactly in reverse; None where it lacks one of them
     same_order: bool | None = None
-    needed: int | None = None  # surfaces needed by Steiger's test to distinguish the two correlations of means
+    # Surfaces needed by Steiger's test to distinguish the two correlations of means; None without a test of these
+    needed: int | None = None
     reasons: dict[str, str] = field(default_factory=dict[str, str])
 
 
@@ -160,8 +161,10 @@ def _compare(rival: Rival, model: Sequence[float], values: Sequence[float], scor
         rival,
         contrast=contrast(first, second, mutual, len(score)),
         same_order=abs(rho) > 1 - 1e-12,
-        needed=required_cases(abs(first), abs(second), math.copysign(1.0, first * second) * mutual),
     )
+    if rival.contrast is not None:
+        signed = math.copysign(1.0, first * second) * mutual
+        rival = replace(rival, needed=required_cases(abs(first), abs(second), signed))
     return _because(rival, contrast=None if rival.contrast else "no test from these few surfaces, or of a perfect r")
 
 

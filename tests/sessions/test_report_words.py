@@ -20,7 +20,7 @@ from sessions.report.tables.session import ground_truth_table, paths_sentence, r
 from sessions.report.tables.session import tables as session_tables
 from sessions.report.tables.study import study_tables
 from sessions.report.trials import omissions
-from sessions.report.wording import correlation
+from sessions.report.wording import correlation, ends_of
 
 FORCE = Variant("small", "computed", "force")
 DOUBT = "Tissue is turned inside out somewhere."
@@ -70,6 +70,12 @@ def test_the_usual_path_has_the_strain_of_the_report_s_prediction():
     assert usual == "small"
     at_finite = experiments_of(tables(), kinematics="finite")[0].paths  # none of these paths was at finite strain
     assert not [path for path in at_finite if path.usual]
+
+
+def test_an_r_of_three_surfaces_says_why_it_has_no_interval():
+    three = [replace(each, scores=tuple(s for s in each.scores if s.index in (0, 20, 100))) for each in tables()]
+    (sticky, _) = [one.score_relation for one in experiments_of(three)]
+    assert ends_of(sticky) == ", no interval of r from 3 points"
 
 
 def test_a_usual_path_without_a_correlation_is_told(report):

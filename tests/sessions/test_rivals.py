@@ -160,6 +160,16 @@ def test_only_rivals_of_all_the_surfaces_are_said_to_order_them_as_the_model_doe
     assert "static" not in order
 
 
+def test_three_surfaces_have_no_test_and_so_no_number_of_surfaces_that_a_test_needs():
+    sed, mu = {0: 1.0, 50: 4.0, 100: 6.0}, {0: 0.2, 50: 0.3, 100: 0.7}
+    rivals = rivals_of_means({0: 5.0, 50: 50.0, 100: 80.0}, {MODEL_SED: sed, MODEL_MU: mu})
+    assert rivals[-1].needed is None
+    assert rivals_sentences("stickiness", rivals)[0] == (
+        "Stickiness: µ of the model orders these 3 surfaces as the SED does, so no order of scores can distinguish it "
+        "from it."
+    )
+
+
 def test_a_single_rival_is_one_rival():
     contrast_of_one = Contrast(5, 0.9, 0.5, 1.2, 3.0, 0.003)
     rivals = (Rival(MODEL_SED, 5, 0.9, None, None), Rival("N", 5, 0.0, None, None, contrast_of_one))

@@ -5,7 +5,7 @@ from textwrap import fill
 
 from sessions.report.tables import Row, Table, estimate_cell, number_cell, table
 from sessions.report.wording import NONE, capital, correlation, digits, p_value, places, plural
-from sessions.statistics.correlations import POWER
+from sessions.statistics.correlations import LEAST_OF_STEIGER, POWER
 from sessions.statistics.rivals import RESPONSES, Rival
 from sessions.statistics.scores import bounds
 from sessions.statistics.within_subjects import holm
@@ -80,13 +80,16 @@ def _alike(name: str, model: str, rivals: Sequence[Rival]) -> list[str]:
     figure_texts = [f"{figure} ({name})" for figure, name in reversed(figures.items())]
     opening = (
         f"{capital(name)}: {names} {order} these {rivals[0].n} surfaces as the {model} does, so no order "
-        f"of scores can distinguish {them} from it; "
+        f"of scores can distinguish {them} from it"
     )
+    if rivals[0].n < LEAST_OF_STEIGER:
+        return [f"{opening}."]
+    opening += "; at the r seen here, "
     if not figure_texts:
-        return [f"{opening}at the r seen here, no number of surfaces would."]
+        return [f"{opening}no number of surfaces would."]
     power = f"{POWER:.0%} power".replace("%", "\N{NO-BREAK SPACE}%")
     counts_text = " to ".join(figure_texts)
-    return [f"{opening}at the r seen here, Steiger's test would need {counts_text} surfaces for {power}."]
+    return [f"{opening}Steiger's test would need {counts_text} surfaces for {power}."]
 
 
 def _verdict(name: str, model: str, rivals: Sequence[Rival]) -> str:
