@@ -174,8 +174,9 @@ def _model(trials: Sequence[tuple[str, TrialRow, float]], quantity: Quantity, *t
     """
     count = len({subject for subject, _, _ in trials})
     if count < 3:
-        requirements = {(INDEX,): "scores", (INDEX, FRICTION): "scores and a µ of their own"}
-        requirement = requirements.get(terms, f"scores and a predicted {quantity.label}")
+        requirement = f"scores and a predicted {quantity.label}"
+        if INDEX in terms:
+            requirement = "scores and a µ of their own" if FRICTION in terms else "scores"
         count_text = "there is 1" if count == 1 else f"there are {count or 'none'}"
         return f"it takes three subjects with {requirement}, and {count_text}"
     subjects, rows, scores = zip(*trials, strict=True)
