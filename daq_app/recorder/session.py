@@ -238,7 +238,7 @@ class _Operator:
     def stop(self) -> Ending | None:
         """Return why the session must end now: a stop, or the client is gone and no finger touches; else None.
 
-        What was answered before the client went still counts.
+        Requests that came before the client went are carried out first.
         """
         if self._inbox.stop_wanted.is_set():
             return "stopped", STOPPED_BY_USER
