@@ -183,7 +183,8 @@ def _rate(bench: BenchState) -> str:
     if bench.info is None:
         return "–"
     rate = quantity(bench.info.rate, 0) if isfinite(bench.info.rate) else tr("unknown")
-    return tr("{measured} Hz (set {asked})", measured=quantity(bench.rate, 0), asked=rate)
+    measured = quantity(bench.rate, 0) if bench.rate > 0.0 else "–"  # nothing is being measured
+    return tr("{measured} Hz (set {asked})", measured=measured, asked=rate)
 
 
 def _bars(bench: BenchState) -> tuple[Bar, ...]:

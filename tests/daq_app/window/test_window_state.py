@@ -266,6 +266,11 @@ def test_the_health_lamp_names_what_was_lost():
     assert dict(bench.counters)["lost"] == "3"
 
 
+def test_a_bench_that_is_not_being_read_has_a_dash_for_its_rate():
+    report = m.HealthReport(Health(), 0.0, (0.0,) * 7, (0.0,) * 7, 0)
+    assert derive_view(after(m.Device(INFO, None), report)).bench.rate == "– Hz (set 7000)"
+
+
 def test_what_was_lost_and_a_rate_that_is_not_known_are_said_in_the_experimenters_language(monkeypatch):
     monkeypatch.setattr("daq_app.window.view.tr", lambda text, **values: f"<{text.format(**values)}>")
     report = m.HealthReport(Health(received=7000, lost=3), 6998.0, (0.0,) * 7, (0.0,) * 7, 0)
