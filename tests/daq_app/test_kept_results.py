@@ -1,15 +1,18 @@
 """What somebody set is kept, or named where it is lost; nothing of somebody else's is written over."""
 
 import json
-import shutil
 from unittest.mock import Mock
 
 import pytest
 from json_answer import answer
+from report_example import example
 
 from daq_app.analyst.work import Work
 from daq_app.cli.main import run
+from sessions.file_access import NotOurs
 from sessions.recording import RecordingError
+from sessions.report import pages
+from sessions.report.figures import plates
 
 
 @pytest.mark.parametrize("verb", ["analyse", "predict"])
@@ -112,19 +115,16 @@ def test_a_study_replaces_its_own_files_and_no_other(small, tmp_path):
     assert (tmp_path / "results" / "notes.txt").read_text() == "mine\n"
 
 
-def test_pictures_of_a_report_are_written_over_no_file_of_somebody_else(small, tmp_path, capsys):
-    figures = tmp_path / "figures"
-    words = ["report", str(small), "-o", str(tmp_path / "page.html"), "--figures", str(figures)]
+def test_pictures_of_a_report_are_written_over_no_file_of_somebody_else(tmp_path):
+    report = example()
+    drawings = plates(report)
     for name in ("course.svg", "course.csv"):
-        figures.mkdir()
-        (figures / name).write_text("<svg >mine</svg>\n")
-        assert run(words) == 1
-        assert f"{figures / name} holds something else" in capsys.readouterr().err
-        assert [(file.name, file.read_text()) for file in figures.iterdir()] == [(name, "<svg >mine</svg>\n")]
-        assert not (tmp_path / "page.html").exists()
-        shutil.rmtree(figures)
-    for _ in range(2):
-        assert run(words) == 0
+        (tmp_path / name).write_text("<svg >mine</svg>\n")
+        with pytest.raises(NotOurs, match=f"{name} holds something else"):
+            pages.write_figures(report, tmp_path, drawings)
+        assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [(name, "<svg >mine</svg>\n")]
+        (tmp_path / name).unlink()
+    assert pages.write_figures(report, tmp_path, drawings) == pages.write_figures(report, tmp_path, drawings)
 
 
 @pytest.mark.parametrize("name", ["accuracy.html", "accuracy.json", "figures"])
