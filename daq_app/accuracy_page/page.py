@@ -310,8 +310,9 @@ def write(results: RunResults, folder: Path) -> tuple[Path, ...]:
     data = folder / DATA
     swap_in(data, json.dumps(results.to_dict(), indent=1, allow_nan=False) + "\n")
     figures = plates(results)
-    texts = {folder / FIGURES / f"{panel.name}.svg": panel.svg for plate in figures.values() for panel in plate.panels}
-    texts[folder / PAGE] = page(results, figures)
-    for path, text in texts.items():
+    pictures = {
+        folder / FIGURES / f"{panel.name}.svg": panel.svg for plate in figures.values() for panel in plate.panels
+    }
+    for path, text in (pictures | {folder / PAGE: page(results, figures)}).items():
         swap_in(path, text)
-    return (folder / PAGE, data, *list(texts)[:-1])
+    return (folder / PAGE, data, *pictures)

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from solver._kernels import OPEN, SLIP, STICK
-from solver.accuracy import richardson_factor
+from solver.accuracy.convergence_order import richardson_factor
 from solver.accuracy.error_estimate import NO_NESTED_STATE, PARTS, Steps, edge_share, errors
 from solver.arrays import Array, Indices
 from solver.body import Patches

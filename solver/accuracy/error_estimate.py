@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from solver._kernels.active_set import SINGULAR
-from solver.accuracy import ORDER, richardson_factor
+from solver.accuracy.convergence_order import ORDER, richardson_factor
 from solver.arrays import Array
 from solver.contact import ForceLoad
 from solver.equilibrium import EquilibriumState, Newton

@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 from time import perf_counter
 
-from solver.accuracy import audits, order_of
+from solver.accuracy import audits
 from solver.accuracy.adaptivity import choose_steps, nested_numbers, steps_of_press
+from solver.accuracy.convergence_order import order_of
 from solver.accuracy.error_estimate import NO_NESTED_STATE, Steps, edge_changes
 from solver.arrays import Array
 from solver.continuation.existence import is_folded, is_sound, limit_warnings, refuse_far_beyond

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver.accuracy import order_of
+from solver.accuracy.convergence_order import order_of
 from solver.accuracy.error_estimate import PARTS, edge_changes, half_width
 from solver.arrays import Array
 from solver.contact import ForceLoad

@@ -10,8 +10,9 @@ from time import perf_counter
 
 import numpy as np
 
-from solver.accuracy import audits, order_of
+from solver.accuracy import audits
 from solver.accuracy.adaptivity import choose_steps, nested_numbers, steps_of_press
+from solver.accuracy.convergence_order import order_of
 from solver.accuracy.error_estimate import NO_NESTED_STATE, Steps, edge_changes
 from solver.arrays import Array
 from solver.continuation.small_states import (

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from solver._kernels.contact_system import SHEAR_LIMITED_MU
-from solver.accuracy import trial_warnings
 from solver.accuracy.adaptivity import refine_lines
+from solver.accuracy.convergence_order import trial_warnings
 from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error
 from solver.accuracy.omitted_effects import COARSE, Answer, measure_differences, with_viscosity
 from solver.equilibrium.finger import LinearFinger

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.accuracy import trial_warnings
+from solver.accuracy.convergence_order import trial_warnings
 from solver.failures import SolveFailure
 from solver.prediction import Prediction, percent
 from solver.response.solution import solve, solve_many

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver import Finger, Friction, Loading, Material, Materials, Receptor, Relaxation, Scene, Solve, solve
-from solver.accuracy import trial_warnings
+from solver.accuracy.convergence_order import trial_warnings
 from solver.accuracy.error_estimate import errors, half_width
 from solver.continuation.small_states import expected_depth, nearest_state, settled_state
 from solver.equilibrium import EQUILIBRIUM

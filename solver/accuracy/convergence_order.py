@@ -1,0 +1,106 @@
+"""The order of convergence of a scene's errors with the element size, and the scenes that have none.
+
+Errors of quadratic elements beneath a contact fall at least with the square of the element size. At a straight or
+convex corner of held and free tissue, displacements follow r^a with a >= 1/2 (Williams 1952, J. Appl. Mech. 19, 526),
+and errors of the energy follow the power 2 a. Such a corner lies where bone meets the free cut.
+
+At finite strain that corner is squeezed further on each finer mesh. A free face folds where it is squeezed along itself
+below a critical stretch (Biot 1963, Appl. Sci. Res. A 12, 168). Where only one element falls below it, the mesh does
+not resolve a fold, and the corner sets the order. Where more do, the cut folds. Such folds have no intrinsic size:
+finer meshes fold differently, and no error is known. The same is true where a stiff layer wrinkles on a soft one (Allen
+1969, Analysis and Design of Structural Sandwich Panels, chapter 8): its equilibrium without wrinkles is unstable.
+"""
+
+from collections.abc import Iterator
+from functools import lru_cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from solver.continuation import critical_stretch
+from solver.equilibrium import EquilibriumState
+from solver.equilibrium.finger import Finger, FiniteFinger, finite_laws, settled_moduli
+from solver.failures import WRINKLES, Folds, cut_folds
+from solver.prediction import percent
+from solver.scene import Scene
+from solver.scene.tables import TISSUES, Materials
+
+ORDER, CORNER_ORDER = 2.0, 1.0  # beneath a contact, and at a corner
+# Largest ratio of stiffnesses of neighbouring tissues in the trials in which errors fall with the square [-].
+SECOND_ORDER = {"small": 100.0, "finite": 6.0}
+
+
+def richardson_factor(order: float) -> float:
+    """Return the ratio of a mesh's error to the change by halving its elements: the sum of a geometric series."""
+    return 1.0 / (1.0 - 2.0**-order)
+
+
+def order_of(finger: Finger[Any], state: EquilibriumState) -> float:
+    """Return the order of convergence that an estimate assumes, from the `state` on its nested mesh.
+
+    It is `CORNER_ORDER` where the element at the corner of bone and cut is squeezed, where neighbouring tissues differ
+    in stiffness by more than in trials that show second order, or where skin stiffens as it stretches. Raises Folds
+    where the cut folds or tissue wrinkles.
+    """
+    scene = finger.scene
+    squeezed = False
+    if isinstance(finger, FiniteFinger):
+        squeezed = scene.finger.cut == "free" and _check_cut(finger, state)
+        if not finger.newton.is_stable(state):
+            raise Folds(WRINKLES)
+    stiffens = any(tissue.law == "ogden" for tissue in scene.meshed_tissues)
+    at_corner = squeezed or stiffens or _stiffness_ratio(scene.materials)[0] > SECOND_ORDER[scene.solve.kinematics]
+    return CORNER_ORDER if at_corner else ORDER
+
+
+def _check_cut(finger: FiniteFinger, state: EquilibriumState) -> bool:
+    """Return whether an element at the free cut of a nested mesh is squeezed below the stretch at which faces fold.
+
+    Raises Folds where more than one is at either end.
+    """
+    mesh = finger.body.mesh
+    columns = np.arange(len(mesh.elements)).reshape(len(finger.geometry.arcs) - 1, -1)
+    outer = columns[[0, 1, -2, -1]].ravel()  # in the outer columns of the mesh that this one divides
+    F = finger.body.deformation(state.u).reshape(len(mesh.elements), -1, 2, 2)[outer]
+    least = np.linalg.svd(F, compute_uv=False)[..., -1].min(axis=1)
+    laws = finite_laws(finger.scene.materials)
+    folds = np.array([critical_stretch(laws[region]) for region in mesh.region[outer]])
+    ends = (least < folds).reshape(2, -1).sum(axis=1)
+    if ends.max() > 1:
+        worst = int((least - folds).argmin())
+        raise cut_folds(float(least[worst]), float(folds[worst]))
+    return bool(ends.any())
+
+
+_ROUND_OFF = 1e-12  # relative, of a stiffness
+TRIAL_RATIO = 100.0  # largest ratio of stiffnesses of neighbouring tissues in the trials where estimates hold [-]
+TRIAL_DEPTH = 0.5  # deepest presses at finite strain in those trials, relative to the tissue's thickness [-]
+
+
+def trial_warnings(scene: Scene, depth: float) -> Iterator[str]:
+    """Yield a warning for each way in which a scene, pressed to a `depth` [mm], exceeds the trials of the estimates.
+
+    Tissues are relaxed, as in the answer.
+    """
+    ratio, stiff, soft = _stiffness_ratio(scene.materials)
+    if ratio > TRIAL_RATIO:
+        yield (
+            f"The {stiff} is {float(f'{ratio:.2g}'):,.0f} times as stiff as the {soft}. Error estimates hold in trials "
+            f"up to {TRIAL_RATIO:.0f} times; beyond, errors of up to twice the estimate were seen."
+        )
+    part = depth / scene.finger.pulp_thickness()
+    if scene.solve.kinematics == "finite" and part > TRIAL_DEPTH:
+        yield (
+            f"The finger is pressed by {percent(part)} of its tissue. Error estimates hold in trials up to "
+            f"{percent(TRIAL_DEPTH)}; beyond, errors of up to five times the estimate were seen."
+        )
+
+
+@lru_cache(maxsize=32)
+def _stiffness_ratio(materials: Materials) -> tuple[float, str, str]:
+    """Return the largest stiffness ratio of neighbouring tissues, less round-off, and the stiffer and softer one."""
+    stiffness = {name: moduli.engineering[0] for name, moduli in zip(TISSUES, settled_moduli(materials), strict=True)}
+    pairs = [pair for outer, inner in pairwise(TISSUES[:-1]) for pair in ((outer, inner), (inner, outer))]
+    ratio, stiff, soft = max((stiffness[a] / stiffness[b], a, b) for a, b in pairs)
+    return ratio * (1.0 - _ROUND_OFF), stiff, soft
