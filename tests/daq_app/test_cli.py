@@ -154,6 +154,14 @@ def test_a_script_of_a_simulated_device_is_refused_as_every_other_file_is(tmp_pa
     assert words in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("kind", ["units", "steal"])
+def test_a_fault_that_only_another_box_can_show_is_refused(tmp_path, capsys, kind):
+    script = tmp_path / "script.toml"
+    script.write_text(f'[[fault]]\nkind = "{kind}"\nfrom = 1.0\nto = 2.0\n')
+    assert run(["simulate", "serial-ft", "--script", str(script)]) == 2
+    assert f"script.toml: the fault '{kind}' belongs to net-ft, not to serial-ft" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("name", ["none.csv", "none.h5"])
 def test_a_file_to_be_imported_that_is_not_there_is_said_to_be_so(tmp_path, capsys, name):
     assert run(["import", str(tmp_path / name), "--out", str(tmp_path / "out")]) == 1

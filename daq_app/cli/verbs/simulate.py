@@ -17,6 +17,7 @@ from sessions.plan.protocols.protocol import LARGEST_SEED
 EXAMPLE = "daq-app simulate net-ft --rdt-port 50000 --tcp-port 50001 --http-port 8080"
 _BAUDS = (4800, 9600, 19200, 38400, 57600, 115200)
 PORTS = {"rdt_port": 49152, "tcp_port": 49151, "http_port": None}  # of net-ft, by default
+_FAULTS_OF_NET_FT = ("units", "steal")  # that other wires cannot show
 OF_ONE_WIRE = {**dict.fromkeys((*PORTS, "rate"), "net-ft"), "baud": "serial-ft"}
 
 
@@ -43,6 +44,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.wire == "net-ft":
         settings["ports"] = tuple(settings.pop(name, usual) for name, usual in PORTS.items())
     timetable = None if options.script is None else load_timetable(options.script)
+    for fault in () if timetable is None or options.wire == "net-ft" else timetable.faults:
+        if fault.kind in _FAULTS_OF_NET_FT:
+            raise WrongValue(f"{options.script}: the fault {fault.kind!r} belongs to net-ft, not to {options.wire}")
     box = serve(options.wire, **settings, seed=options.seed, factor=options.factor, timetable=timetable)
     try:
         console.result(address=box.uri, simulated=True)
