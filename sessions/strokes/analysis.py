@@ -217,8 +217,9 @@ def preview(recording: Recording, decision: Decision, decisions: Decisions, pres
 def _extent(analysis: Analysis, decision: Decision) -> str:
     """Return a sentence with the ends of a decision's stroke; empty where they are not known."""
     for stroke in analysis.strokes:
-        if (stroke.trial, stroke.number) == (decision.trial, decision.stroke) and stroke.onset and stroke.lift:
-            return f" The stroke lasts from {stroke.onset:.3f} to {stroke.lift:.3f} s."
+        ends = stroke.onset, stroke.lift
+        if (stroke.trial, stroke.number) == (decision.trial, decision.stroke) and None not in ends:
+            return " The stroke lasts from {:.3f} to {:.3f} s.".format(*ends)
     return ""
 
 

@@ -234,10 +234,17 @@ def break_away_draws(
     return np.concatenate(draws)
 
 
-def stick_slip(time: Array, ratio: Array, noise: float, settings: AnalysisSettings) -> tuple[float, float] | None:
-    """Return the frequency of slips [Hz] in unfiltered T/N (n,) [-] at `time` (n,) [s]; None without stick-slip.
+class StickSlip(NamedTuple):
+    """Stick-slip of a contact."""
 
-    Also the climb of T/N between readings [-]: they may miss a crest by it. `noise` is T/N's standard deviation [-].
+    frequency: float  # of the slips [Hz]
+    crest_gap: float  # climb of T/N between readings: they may miss a crest by it [-]
+
+
+def stick_slip(time: Array, ratio: Array, noise: float, settings: AnalysisSettings) -> StickSlip | None:
+    """Return the stick-slip in unfiltered T/N (n,) [-] at `time` (n,) [s]; None without one.
+
+    `noise` is the standard deviation of T/N [-].
     """
     limits = settings.ratio
     step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
@@ -254,7 +261,7 @@ def stick_slip(time: Array, ratio: Array, noise: float, settings: AnalysisSettin
         return None
     steps = np.diff(ratio)
     climb = float(np.nanmedian(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
-    return float((len(drops) - 1) / (time[drops[-1]] - time[drops[0]])), climb
+    return StickSlip(float((len(drops) - 1) / (time[drops[-1]] - time[drops[0]])), climb)
 
 
 def _beginnings(mask: Mask) -> NDArray[np.intp]:

@@ -235,13 +235,13 @@ def _stick_slip(
     slips = stick_slip(track.time[window], ratio[window], noise_of_ratio(zero, level, load), track.settings)
     if slips is None:
         return None
-    frequency, crest_gap = slips[0], slips[1] * load
+    crest_gap = slips.crest_gap * load
     filtered, unfiltered = findings.numbers["peak_tangential"], float(np.nanmax(drag))
     traction, area = _greatest_traction(track, drag, planned_area)
     findings.numbers |= {"tau_max": traction, "contact_area": area, "peak_tangential": unfiltered}
     percent_above = 100 * (unfiltered / filtered - 1.0)
     sentence = (
-        f"The contact sticks and slips at {frequency:.2g} Hz: the greatest tangential force and tau_max are "
+        f"The contact sticks and slips at {slips.frequency:.2g} Hz: the greatest tangential force and tau_max are "
         f"those of unfiltered forces, {percent_above:.2g} % above the filtered ones; readings may miss "
         f"the crest by {100 * crest_gap / unfiltered:.1g} %, and noise raises it."
     )

@@ -84,9 +84,15 @@ def _import_foreign(folder: Path, options: argparse.Namespace, console: Console)
     units = _names(options.units)
     if units is not None and len(units) != 2:
         raise WrongValue(f"--units {options.units} is not allowed: give two, of forces and torques, such as N,Nmm")
-    plain = {name: getattr(options, name) for name in ("normal", "height", "rate", "zeroed")}
-    pair, subject = None if units is None else (units[0], units[-1]), options.subject or "unknown"
-    import_options = ImportOptions(units=pair, axes=_names(options.axes), subject=subject, **plain)
+    import_options = ImportOptions(
+        units=None if units is None else (units[0], units[-1]),
+        axes=_names(options.axes),
+        normal=options.normal,
+        height=options.height,
+        rate=options.rate,
+        zeroed=options.zeroed,
+        subject=options.subject or "unknown",
+    )
     with _whole_session(folder):
         summary = import_csv(options.file, folder, import_options)
         seal(summary.folder)
