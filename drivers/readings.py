@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from drivers.arrays import Array, Indices
+from drivers.arrays import Array, Indices, Mask
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,6 +37,10 @@ class ReadingBlock:
     def between(self, start: int, stop: int) -> "ReadingBlock":
         """Return the readings at positions start <= i < stop."""
         return ReadingBlock(**{name: getattr(self, name)[start:stop] for name in _COLUMNS})
+
+    def where(self, mask: Mask) -> "ReadingBlock":
+        """Return the readings that a mask (n,) marks."""
+        return ReadingBlock(**{name: getattr(self, name)[mask] for name in _COLUMNS})
 
     @staticmethod
     def empty() -> "ReadingBlock":

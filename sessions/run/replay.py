@@ -274,12 +274,19 @@ class _Player:
         self._said_ns[kind] = self.clock.now_ns()
 
 
+_FORMER_RULES = {"sound_only": False}
+
+
 def recorded_settings(log: Sequence[LoggedEvent]) -> RunnerSettings:
-    """Return the settings recorded in the log of a session or a part; the defaults where it has none."""
+    """Return the settings recorded in the log of a session or a part; the defaults where it has none.
+
+    A recording without one of the later settings was made by the former rule.
+    """
     for event in log:
         if event.kind in ("started", "resumed"):
             settings = event.data["settings"] if event.kind == "started" else event.data["run"]
-            return msgspec.convert({name: setting["value"] for name, setting in settings.items()}, RunnerSettings)
+            values = {name: setting["value"] for name, setting in settings.items()}
+            return msgspec.convert(_FORMER_RULES | values, RunnerSettings)
     return RunnerSettings()
 
 

@@ -46,6 +46,7 @@ class RunnerSettings:
     losses_every: float = 1.0  # least time between two reports of lost readings [s, session clock]
     status_every: float = 0.1  # between two calls of `progress` [s, session clock]
     detection: DetectorSettings = field(default_factory=DetectorSettings)  # of the live detector, and of a quiet zero
+    sound_only: bool = True  # readings with invalid values show neither zero nor contact
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +194,8 @@ class _Run:
             for event in self._watch.feed(block):
                 self._take(event)
         if isinstance(self._state, Taring) and self._due("zero", self.settings.zero_patience):
-            zero_missing = Tell("the zero cannot be measured while something moves or touches; take hands off")
+            assert self._watch is not None, "a zero that is measured has a watch"
+            zero_missing = Tell(self._watch.zero_obstacle)
             self.writer.event("told", trial_in_hand(self._state), {"sentence": zero_missing.sentence})
             self.operator.show(zero_missing)
         self._report_losses()
@@ -241,8 +243,10 @@ class _Run:
 
     def _begin_watch(self) -> None:
         assert self.transducer is not None, "a zero is measured only where there is a transducer"
-        settings, info = self.settings, self.transducer.info
-        self._watch = TakeWatch(info, self.plan.frame, settings.zero_duration, settings.detection, settings.after_lift)
+        settings, info, frame = self.settings, self.transducer.info, self.plan.frame
+        self._watch = TakeWatch(
+            info, frame, settings.zero_duration, settings.detection, settings.after_lift, settings.sound_only
+        )
         self._due_ns["zero"] = self.clock.now_ns() + round(settings.zero_patience * 1e9)
 
     def _report_losses(self, *, immediately: bool = False) -> None:

@@ -24,12 +24,16 @@ class ResumableClock(SimulatedClock):
 
 
 class StandIn:
-    """A transducer at 200 Hz on the clock of the test. `touches` press it: (from, to, newtons), session clock [ns]."""
+    """A transducer at 200 Hz on the clock of the test. `touches` press it: (from, to, newtons), session clock [ns].
+
+    In the spans of `dropouts` (from, to) it sends zeros, with a status that marks them as invalid.
+    """
 
     def __init__(self, clock, *, seed=0, lost=(), link_lost_after=None, rate_words=""):
         self.clock = clock
         self.info = INFO
         self.touches = []
+        self.dropouts = []
         self.sent = 0
         self.lost = set(lost)  # sequence numbers that never arrive
         self.link_lost_after = link_lost_after  # readings
@@ -72,7 +76,11 @@ class StandIn:
             force += newtons * ((received >= begin) & (received < end))
         raw = np.zeros((len(numbers), 6))
         raw[:, 2] = np.round(-force * 1e6)
-        return ReadingBlock(numbers, numbers * 35, numbers * 0, numbers / RATE, received, raw)
+        status = numbers * 0
+        for begin, end in self.dropouts:
+            status[(received >= begin) & (received < end)] = 1
+        raw[status != 0] = 0.0
+        return ReadingBlock(numbers, numbers * 35, status, numbers / RATE, received, raw)
 
 
 class Hands:
