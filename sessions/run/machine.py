@@ -37,15 +37,19 @@ def start(plan: SessionPlan) -> Step:
     return Idle(Position(plan, 0, (Progress(),) * len(plan.trials))), (steps.AskBegin(),)
 
 
-def advance(state: State, event: steps.Event) -> Step:
-    """Return the next state and the commands that enter it; an event that does not fit the state is refused."""
+def advance(state: State, event: steps.Event, *, keep_answered: bool = True) -> Step:
+    """Return the next state and the commands that enter it; an event that does not fit the state is refused.
+
+    An abort discards the open take; with `keep_answered` a take that only waits for its end is kept.
+    """
     match state, event:
         case Ended(), _:
             return state, (_refusal(state, event),)
         case _, steps.Abort(reason):
             cause = reason.strip() or "no reason given"
-            commands = (*_discard_commands(state, cause), steps.EndSession(cause, complete=False))
-            return Ended(cause, complete=False), commands
+            answered = keep_answered and isinstance(state, Settling)
+            takes = (_keep_command(state.position),) if answered else _discard_commands(state, cause)
+            return Ended(cause, complete=False), (*takes, steps.EndSession(cause, complete=False))
         case _, steps.Note(text):
             return state, () if text.strip() else (steps.Refuse("an empty note is not stored: write a text"),)
         case _, steps.Pause() | steps.Resume() | steps.RestOver():
@@ -64,13 +68,18 @@ def advance(state: State, event: steps.Event) -> Step:
             return _advance_course(state, event)
 
 
-def resume_interrupted(state: State, reason: str) -> Step:
+def resume_interrupted(state: State, reason: str, *, keep_answered: bool = True) -> Step:
     """Return the state in which an interrupted session continues, and the commands that enter it.
 
     It continues at the same trial. An open take is discarded for `reason`: nobody knows what followed its last reading.
-    A pause or a rest is over. The second of two compared trials begins again with the first.
+    With `keep_answered` a take whose stroke and answer are done is kept, and the session continues at the next trial. A
+    pause or a rest is over. The second of two compared trials begins again with the first.
     """
     match state:
+        case Settling(position) if keep_answered:
+            state, (keep, *_) = _keep_take(position)
+            resumed, commands = resume_interrupted(state, reason)
+            return resumed, (keep, *commands)
         case Idle():
             return state, (steps.AskBegin(),)
         case Closing():
@@ -265,9 +274,12 @@ def _stroke_over(position: Position) -> Step:
 
 
 def _keep_take(position: Position) -> Step:
-    keep = steps.KeepTake(position.trial.number, position.take)
     next_state, commands = _next(position.with_progress(replace(position.progress[position.index], kept=True)))
-    return next_state, (keep, *commands)
+    return next_state, (_keep_command(position), *commands)
+
+
+def _keep_command(position: Position) -> steps.Command:
+    return steps.KeepTake(position.trial.number, position.take)
 
 
 def _return_to(position: Position, reason: str) -> Step:

@@ -274,7 +274,7 @@ class _Player:
         self._said_ns[kind] = self.clock.now_ns()
 
 
-_FORMER_RULES = {"sound_only": False}
+_FORMER_RULES = {"sound_only": False, "keep_answered": False}
 
 
 def recorded_settings(log: Sequence[LoggedEvent]) -> RunnerSettings:
@@ -329,7 +329,8 @@ def _resume_part(plan: SessionPlan, earlier_events: Sequence[LoggedEvent], log: 
         return _RecordedSeam(**seams[0]) if seams else _RecordedSeam(0, 0.0)
 
     data = {name: value for name, value in resumption_data.items() if name != "run"}
-    return Continuation(resumption(plan, earlier_events), data, ReadingBlock.empty(), seam_between)
+    place = resumption(plan, earlier_events, keep_answered=recorded_settings(log).keep_answered)
+    return Continuation(place, data, ReadingBlock.empty(), seam_between)
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,10 +36,11 @@ class Resumption:
     commands: tuple[Command, ...]  # that enter the state, without those about takes
 
 
-def resumption(plan: SessionPlan, events: Sequence[LoggedEvent]) -> Resumption:
+def resumption(plan: SessionPlan, events: Sequence[LoggedEvent], *, keep_answered: bool = True) -> Resumption:
     """Return where a session with this log continues: at the same trial, its open take discarded.
 
-    Raises RecordingError where an event does not follow from those before it.
+    With `keep_answered` it continues after a trial whose stroke and answer are done. Raises RecordingError where an
+    event does not follow from those before it.
     """
     state, _ = start(plan)
     due_lines: list[Line] = []
@@ -59,9 +60,9 @@ def resumption(plan: SessionPlan, events: Sequence[LoggedEvent]) -> Resumption:
             due_lines = _of_takes(commands)
         elif line in due_lines:
             due_lines.remove(line)
-        elif entry.kind in ("take_discarded", "resumed"):  # by the end of an earlier part, or by its resumption
-            state, _ = resume_interrupted(state, CUT_SHORT)
-    state, commands = resume_interrupted(state, CUT_SHORT)
+        elif entry.kind in ("take_kept", "take_discarded", "resumed"):  # by an earlier part's end, or its resumption
+            state, _ = resume_interrupted(state, CUT_SHORT, keep_answered=entry.kind == "take_kept")
+    state, commands = resume_interrupted(state, CUT_SHORT, keep_answered=keep_answered)
     due = _of_takes(commands)
     pending = tuple(command for command in commands if line_of(command) not in due)
     return Resumption(state, (*due_lines, *due), pending)

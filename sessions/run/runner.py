@@ -47,6 +47,7 @@ class RunnerSettings:
     status_every: float = 0.1  # between two calls of `progress` [s, session clock]
     detection: DetectorSettings = field(default_factory=DetectorSettings)  # of the live detector, and of a quiet zero
     sound_only: bool = True  # readings with invalid values show neither zero nor contact
+    keep_answered: bool = True  # an end of the session keeps a take whose stroke and answer are done
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +213,7 @@ class _Run:
     def _take(self, event: Event) -> None:
         """Pass an event to the machine, write event and commands, then carry the commands out."""
         previous, kind = self._state, kind_of(type(event))
-        self._state, commands = advance(previous, event)
+        self._state, commands = advance(previous, event, keep_answered=self.settings.keep_answered)
         refusals = [command for command in commands if isinstance(command, Refuse)]
         if refusals:
             data = {"event": kind, "sentence": refusals[0].sentence, "given": data_of(event)}
@@ -296,7 +297,7 @@ class _Run:
         with closing(self.writer):
             health = self._last_readings()
             if not isinstance(self._state, Ended):
-                self._state, commands = advance(self._state, Abort(reason))
+                self._state, commands = advance(self._state, Abort(reason), keep_answered=self.settings.keep_answered)
                 self._write(commands)
             complete = isinstance(self._state, Ended) and self._state.complete
             self._report_losses(immediately=True)

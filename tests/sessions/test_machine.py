@@ -369,3 +369,19 @@ def test_abort_names_its_reason_and_discards_the_open_take():
     state, commands = after(FORCES, Begin(), mount(), Abort("fire alarm"))
     assert commands == (DiscardTake(1, 1, "fire alarm"), EndSession("fire alarm", complete=False))
     assert state == Ended("fire alarm", complete=False)
+
+
+def test_an_abort_or_a_crash_keeps_the_take_of_an_answered_stroke():
+    so_far = (Begin(), mount(), Zeroed(), *STROKE, Scored(40.0))
+    assert commands_after(FORCES, *so_far, Abort("ill")) == (KeepTake(1, 1), EndSession("ill", complete=False))
+    state, commands = resume_interrupted(after(FORCES, *so_far)[0], "cut short")
+    assert commands[0] == KeepTake(1, 1)
+    assert trial_in_hand(state) == 2
+    assert isinstance(state, Mounting)
+    assert not any(isinstance(command, DiscardTake) for command in commands)
+
+
+def test_a_crash_after_the_answered_stroke_of_the_last_trial_leaves_only_the_end_to_ask_for():
+    events = [event for trial in range(len(FORCES.trials)) for event in do_trial(trial)]
+    state, _ = after(FORCES, Begin(), *events[:-2], Scored(40.0))
+    assert resume_interrupted(state, "cut short")[1] == (KeepTake(len(FORCES.trials), 1), AskFinish())
