@@ -47,7 +47,7 @@ class WrongValue(Exception):
 
 
 class RecordingKept(KeyboardInterrupt):
-    """The user stopped work that had already recorded data; the message names the folder (exit code 3)."""
+    """A stop or a crash ended work that had already recorded data; the message names the folder (exit code 3)."""
 
 
 class NotWritten(Exception):

@@ -185,7 +185,8 @@ def attend_session(recorder: Recorder, request: m.StartSession | m.ResumeSession
     """Attend a session until it is sealed or cut short; people answer at this terminal unless they are simulated.
 
     A stop is passed on immediately. A second one ends the wait for the sealing, which the recorder finishes alone, or
-    for a recorder that does not answer (RecordingKept). Raises as a driver does, RecordingError, WrongValue.
+    for a recorder that does not answer (RecordingKept). Raises RecordingKept too if the recorder ends during the
+    session, and as a driver does, RecordingError, WrongValue.
     """
     recorder.send(request)
     with interruptions() as interrupted:
@@ -284,4 +285,4 @@ def _raise_failure(report: m.Report, folder: str = "") -> None:
         case m.Failed(_, sentence, kind):
             raise _FAILURES.get(kind, RecordingError)(sentence)
         case m.Gone(_, sentence):
-            raise RecordingError(f"{sentence}, with 'daq-app resume {folder}'" if folder else sentence)
+            raise RecordingKept(f"{sentence}, with 'daq-app resume {folder}'") if folder else RecordingError(sentence)

@@ -6,7 +6,7 @@ import pytest
 from recordings import PLAN
 
 from daq_app.cli.terminal import attend_session, open_device
-from daq_app.console import Console, WrongValue
+from daq_app.console import Console, RecordingKept, WrongValue
 from daq_app.recorder import messages as m
 from drivers.transducer import Health, LinkLost, SetupError
 from sessions.recording import RecordingError
@@ -87,5 +87,5 @@ def test_a_failure_of_the_recorder_is_that_of_the_command_line(report, error):
 
 
 def test_a_recorder_that_ends_during_a_session_leaves_a_sentence_that_names_its_folder():
-    with pytest.raises(RecordingError, match="resume the session, with 'daq-app resume here'"):
+    with pytest.raises(RecordingKept, match="resume the session, with 'daq-app resume here'"):
         attend(([BEGUN], 0.0), ([m.Gone(False, "resume the session")], 0.0))

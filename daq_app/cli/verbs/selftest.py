@@ -212,8 +212,8 @@ def _check_recording(recording: Recording, witness: _WatchedRecorder, trial: int
     block = recording.readings()
     if len(block) < witness.safe or (np.diff(block.sequence) != 1).any():
         raise SelfTestFailed(f"after a kill, {len(block)} of {witness.safe} acknowledged readings were left")
-    first = witness.events[0].number if witness.events else 1
-    trials = {event.trial for event in recording.events if event.kind == "take_kept" and event.number < first}
+    resumed = max((event.number for event in recording.events if event.kind == "resumed"), default=0)
+    trials = {event.trial for event in recording.events if event.kind == "take_kept" and event.number < resumed}
     if trial is not None and trial != len(trials) + 1:
         raise SelfTestFailed(f"the session was killed in trial {len(trials) + 1} and resumed at trial {trial}")
 
