@@ -100,7 +100,7 @@ def _missing_reason(row: TrialPrediction, stroke: Stroke | None) -> str | None:
     if row.direction is None:
         return "Neither the stroke nor a plan gives the direction."
     if row.indentation is None:
-        return "No plan says how deep the model is pressed: give an indentation."
+        return "No plan gives the depth of the press: give it with 'daq-app predict --indentation MM'."
     return None
 
 

@@ -24,11 +24,11 @@ def trials(monkeypatch):
         )
         for trial, stroke in ((7, 0), (None, 1))
     ]
-    recording = SimpleNamespace(folder=Path("P01"), info=object(), simulated_sentence=None)
+    recording = SimpleNamespace(folder=Path("P01"), info=object(), simulated_sentence=None, plan=SimpleNamespace(blocks=["a"]))
     prediction = SimpleNamespace(trials=rows, finger=None, to_dict=dict, options=PredictionOptions(intervals=True))
     monkeypatch.setattr(predict, "stored_options", lambda *_: PredictionOptions())
     monkeypatch.setattr(predict, "open_visit", lambda *_: (recording, (), ()))
-    monkeypatch.setattr(predict, "analyse_session", lambda *_, **__: None)
+    monkeypatch.setattr(predict, "analyse_session", lambda *_, **__: SimpleNamespace(strokes=[0]))
     monkeypatch.setattr(predict, "predict_session", lambda *_: prediction)
     monkeypatch.setattr(predict, "other_signs", lambda _: ())
     monkeypatch.setattr("daq_app.cli.report_tables.table_texts", lambda *_: ())
@@ -60,6 +60,17 @@ def test_a_trial_without_an_sed_is_a_flaw_and_a_session_without_one_says_why(tri
     trials.clear()
     assert run(["predict", "P01"]) == 0
     assert "nothing to predict: no stroke was found" in capsys.readouterr().out
+
+
+def test_a_recording_without_a_plan_needs_the_depth_of_the_press(trials, monkeypatch, capsys):
+    recording, *_ = predict.open_visit()
+    monkeypatch.setattr(recording.plan, "blocks", [])
+    assert run(["predict", "P01"]) == 2
+    answer = capsys.readouterr()
+    assert not answer.out
+    assert "P01 has no plan" in answer.err
+    assert "--indentation" in answer.err
+    assert run(["predict", "P01", "--indentation", "2"]) == 0
 
 
 @pytest.mark.parametrize(("verb", "opening"), [("analyse", ""), ("predict", "nothing to predict: ")])

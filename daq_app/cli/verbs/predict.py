@@ -72,6 +72,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
         variants=options.variants or stored.variants,
     )
     analysis = analyse_session(recording, console, area_law(options), gain_error=options.calibration_error)
+    if options.indentation is None and not recording.plan.blocks and analysis.strokes:
+        advice = "give the depth in mm with --indentation, such as --indentation 2"
+        raise WrongValue(f"{recording.folder} has no plan that says how deep the model is pressed: {advice}")
     prediction = predict_session(recording, analysis, console, choices, afferent if options.afferent else None)
     seal = {"sealed_sha256": seal_prediction(recording, prediction.to_dict())} if options.seal else {}
     firing = {"afferent": firing_document(prediction, afferent)} if options.afferent else {}
