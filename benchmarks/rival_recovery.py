@@ -60,6 +60,7 @@ def main() -> None:
     parser.add_argument("count", nargs="?", type=int, default=200, help="studies of each quantity")
     parser.add_argument("seed", nargs="?", type=int, default=1)
     parser.add_argument("design", nargs="*", type=int, help="its number, from 0; without one, all")
+    parser.add_argument("--own-share", type=float, default=1.0, help="of a stroke's difference, as in `study_weights`")
     options = parser.parse_args()
     header = "study | true | twins | preferred | it or a twin | a wrong one of the model | decided | decided wrongly"
     print(f"| {header} | wrong most often |")
@@ -71,7 +72,8 @@ def main() -> None:
         for quantity in TRUE_QUANTITIES:
             draw = np.random.default_rng([options.seed, number, TRUE_QUANTITIES.index(quantity)])
             repeats = range(options.count)
-            weights = [study_weights(pool, people, len(design.mu), quantity, EFFECTS, draw) for _ in repeats]
+            arguments = pool, people, len(design.mu), quantity, EFFECTS, draw, options.own_share
+            weights = [study_weights(*arguments) for _ in repeats]
             print(row(study, quantity, twins(pool, quantity), weights), flush=True)
 
 

@@ -21,7 +21,15 @@ from sessions.statistics.correlations import Relation, relation
 from sessions.statistics.multiverse import PathTrial, Values, path_findings
 from sessions.statistics.pooled import rival_values, subject_function
 from sessions.statistics.rivals import RIVAL_NAMES, rivals_of_means
-from sessions.statistics.scores import ScoreTable, by_key, distinct_sessions, mean_scores, score_matrix, score_table
+from sessions.statistics.scores import (
+    ScoreTable,
+    by_key,
+    distinct_sessions,
+    mean_scores,
+    reversed_subjects,
+    score_matrix,
+    score_table,
+)
 from sessions.statistics.visit import TrialRow, Visit, visit_from
 from sessions.strokes import Analysis
 from sessions.strokes.stroke import FIXED, AreaLaw
@@ -139,6 +147,7 @@ def experiments(
     paths. `law` gives the contact area, and `kinematics` the strain, of all numbers except those of the paths.
     """
     label = BY_NAME[response].label
+    falling = reversed_subjects(tables)
     blocks: list[Experiment] = []
     for block in plan.blocks:
         if block.phase != "main":
@@ -170,6 +179,7 @@ def experiments(
                 paths=path_findings(along, kinematics, law, within=False),
                 psychometric=subject_function([(visit, row) for row in trials]) if block.standard else None,
                 other_answers=() if block.standard else _other_answers(trials),
+                falling=tuple(subject for subject, name, _ in falling if name == descriptor),
             )
         )
     return tuple(blocks)

@@ -55,6 +55,7 @@ class Experiment:
     response: str = "sed"  # the quantity at the ending of these relations, one of `solver.quantities`
     # Numbers and choices: trial, judged index, answer; empty where `psychometric` uses them
     other_answers: tuple[tuple[int, str, str], ...] = ()
+    falling: tuple[str, ...] = ()  # subjects whose scores of the descriptor fall as the index rises
 
     @property
     def score_name(self) -> str:

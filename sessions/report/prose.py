@@ -19,6 +19,7 @@ from sessions.report.wording import (
     digits,
     ends_of,
     plural,
+    reversal_sentence,
     shown_response,
     spread_share,
 )
@@ -163,6 +164,10 @@ def summary(report: Report) -> tuple[str, ...]:
             )
         if experiment.paths:
             sentences.append(paths_sentence(experiment.name, experiment.paths))
+    reversals = [
+        reversal_sentence(e.descriptor, len(e.falling), len(e.answers)) for e in report.experiments if e.falling
+    ]
+    sentences += dict.fromkeys(reversals)  # once for a descriptor of several blocks
     noun = "trial" if any(p.trial is not None for p in report.predictions) else "stroke"
     missing_count = sum(p.sed is None for p in report.predictions)
     if missing_count:

@@ -3,7 +3,7 @@
 import re
 import shlex
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 
@@ -12,15 +12,26 @@ from sessions.prediction.stored import UNKNOWNS
 from sessions.report.contents import Fact
 from sessions.report.facts import analysis_arguments, model_arguments
 from sessions.report.prose import OTHER_FINGERS, friction_question
-from sessions.report.tables.rivals import rivals_sentences
+from sessions.report.tables.rivals import levels_of_rivals, rivals_sentences
 from sessions.report.tables.scales import psychometric_sentences, scale_sentences, study_functions
 from sessions.report.tables.session import paths_sentence
-from sessions.report.wording import capital, correlation, digits, full_stop, plural, shown_response, significant
+from sessions.report.wording import (
+    capital,
+    correlation,
+    digits,
+    direction,
+    full_stop,
+    plural,
+    reversal_sentence,
+    shown_response,
+    significant,
+)
 from sessions.statistics.correlations import LEAST_CASES
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.multiverse import Kinematics
 from sessions.statistics.scores import by_key
-from sessions.statistics.visit import STILL_BLINDED, Exclusion
+from sessions.statistics.visit import STILL_BLINDED, Exclusion, TrialRow, exclusion_of
+from sessions.strokes.stroke import FIXED
 
 _MOST_NAMED = 12  # names listed in full
 
@@ -46,7 +57,9 @@ def summary(study: StudyFindings) -> list[str]:
     for findings in study.descriptors:
         sentences += _relation_sentences(findings, study)
         sentences += scale_sentences(findings)
-        sentences += [paths_sentence(findings.descriptor, findings.paths)] if findings.paths else []
+        sentences += (
+            [paths_sentence(findings.descriptor, findings.paths, findings.single_subject)] if findings.paths else []
+        )
     if any(findings.repeated is not None for findings in study.descriptors):
         sentences.append(
             "With the receptor elsewhere or under the measured force the sign may differ, too, as the report of each "
@@ -68,8 +81,8 @@ def distinctions(study: StudyFindings) -> list[str]:
     return [
         sentence
         for findings in study.descriptors
-        for kind, rivals in (("by means over subjects", findings.rivals_of_means), ("within subjects", findings.rivals))
-        for sentence in rivals_sentences(f"{findings.descriptor}, {kind}", rivals)
+        for name, rivals in levels_of_rivals(findings)
+        for sentence in rivals_sentences(name, rivals)
     ]
 
 
@@ -80,26 +93,28 @@ def _relation_sentences(findings: DescriptorFindings, study: StudyFindings) -> l
     if findings.repeated is None:
         trials = Counter(subject for subject, *_ in findings.points)
         if sum(trials.values()) - len(trials) - 1 < 2:
-            return [
-                f"{name}: too few trials have both a score and a predicted {label} to correlate them within subjects."
-            ]
+            within = "" if findings.single_subject else " within subjects"
+            return [f"{name}: too few trials have both a score and a predicted {label} to correlate them{within}."]
+        if findings.single_subject:
+            return [f"{name}: no correlation, since score and {label} do not both vary over the trials."]
         return [f"{name}: no correlation within subjects, since score and {label} both vary in none of them."]
     repeated = findings.repeated
     interval = f"no interval from {plural(repeated.subjects, 'subject')} with two trials or more"
-    if repeated.subjects >= LEAST_CASES:
+    if findings.single_subject:
+        interval = "no interval for other people from one subject"
+    elif repeated.subjects >= LEAST_CASES:
         interval = "no interval, since subjects are alike or r is perfect"
     if repeated.people is not None:
         low, high = map(correlation, repeated.people)
         interval = f"95 % interval for other people on these surfaces {low} to {high}"
     falling = sum(descriptor == findings.descriptor for _, descriptor, _ in study.reversed)
-    scorers = plural(len(findings.answers), "subject")
-    people = plural(len({subject for subject, *_ in findings.points}), "subject")
-    reversals = [f"The scores of {falling} of {scorers} fall as the index rises; the appendix names each."]
+    people = findings.single_subject or plural(len({subject for subject, *_ in findings.points}), "subject")
+    level = "" if findings.single_subject else "within subjects, "
     return [
-        f"{name}: within subjects, score and the {label} predicted at {strain} strain go together by "
+        f"{name}: {level}score and the {label} predicted at {strain} strain go together by "
         f"r = {correlation(repeated.r)} over {plural(len(findings.points), 'trial')} of {people}, {interval}; "
         f"{_otherwise(findings, other_strain)}.",
-        *(reversals if falling else []),
+        *([reversal_sentence(findings.descriptor, falling, len(findings.answers))] if falling else []),
     ]
 
 
@@ -193,7 +208,46 @@ def remarks(study: StudyFindings) -> list[str]:
         "used backwards, or these scores may follow no order."
         for subject, descriptor, r in study.reversed
     ]
-    return [*sentences, *_meshes(study)]
+    return [*sentences, *_different_settings(study), *_meshes(study)]
+
+
+# What sets a prediction besides a stroke's friction, and its text
+_SETTINGS: Mapping[str, Callable[[TrialRow], str]] = {
+    "depth of the model": lambda row: "" if row.indentation is None else f"{row.indentation:g} mm",
+    "contact area": lambda row: "" if row.contact_area is None else f"{row.contact_area:g} mm²",
+    "direction": lambda row: direction(row.direction),
+    "µ of the model": lambda row: row.rule,
+}
+
+
+def _different_settings(study: StudyFindings) -> list[str]:
+    """Return a sentence for each descriptor whose counted sessions predict with different settings."""
+    sentences: list[str] = []
+    copies = dict(study.copies)
+    for findings in study.descriptors:
+        rows = [
+            (
+                visit.session,
+                [row for row in visit.rows if row.descriptor == findings.descriptor and row.sed is not None],
+            )
+            for visit in study.visits
+            if visit.session not in copies and exclusion_of(study.excluded, visit.subject, findings.descriptor) is None
+        ]
+        clauses: list[str] = []
+        for name, text in _SETTINGS.items():
+            if name == "contact area" and study.options.area != FIXED:
+                continue  # it differs by force
+            groups = by_key((", ".join(sorted(set(map(text, trials)))), session) for session, trials in rows if trials)
+            if len(groups) > 1:
+                values = (f"{value}: {_first_few(sessions)}" for value, sessions in groups.items())
+                clauses.append(f"{name} ({'; '.join(values)})")
+        if clauses:
+            sentences.append(
+                f"Predictions for {findings.descriptor} have different settings in different sessions: "
+                f"{', '.join(clauses)}. Means, correlations and models pool them, and part of the differences between "
+                "subjects may come from these settings."
+            )
+    return sentences
 
 
 def _meshes(study: StudyFindings) -> list[str]:

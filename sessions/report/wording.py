@@ -141,6 +141,19 @@ def plural(n: int, noun: str, several: str = "") -> str:
     return f"{n} {noun if n == 1 else several or noun + 's'}"
 
 
+def reversal_sentence(descriptor: str, falling: int, subjects: int) -> str:
+    """Return a sentence on the subjects whose scores fall as the index rises.
+
+    >>> reversal_sentence("stickiness", 1, 1)
+    'The stickiness scores fall as the index rises; the appendix says more.'
+    """
+    if subjects == 1:
+        return f"The {descriptor} scores fall as the index rises; the appendix says more."
+    return (
+        f"The {descriptor} scores of {falling} of {subjects} subjects fall as the index rises; the appendix names each."
+    )
+
+
 def capital(text: str) -> str:
     """Return a text with a capital first letter."""
     return text[:1].upper() + text[1:]

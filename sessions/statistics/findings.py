@@ -120,6 +120,12 @@ class DescriptorFindings:
         default_factory=dict[Judgement, Mapping[int, IntervalEstimate]]
     )
 
+    @property
+    def single_subject(self) -> str:
+        """The code of the only subject with a score and a response of the same trial; "" with several, or with none."""
+        subjects = {subject for subject, *_ in self.points}
+        return subjects.pop() if len(subjects) == 1 else ""
+
 
 class EffectRecovery(msgspec.Struct, frozen=True):
     """The true value of an effect and the study's estimate of it."""

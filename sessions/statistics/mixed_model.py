@@ -167,37 +167,43 @@ def fits_exactly(design: Array, y: Array) -> bool:
     return float(np.abs(residuals).max()) <= 1e-9 * (1.0 + float(np.abs(y).max()))
 
 
-def crossed_deviance(
+def crossed_aic(
     subjects: Sequence[str], surfaces: Sequence[int], y: Sequence[float], x: Sequence[float]
 ) -> float | None:
-    """Return -2 log likelihood of y (n) = intercept + slope x + level of the subject + level of the surface + error.
+    """Return Akaike's criterion, up to a constant, of a model of y (n) with levels of subjects and surfaces and error.
 
-    By maximum likelihood. Models of the same scores with different x have equally many parameters, so AICs differ as
-    deviances do. None where x does not vary, or where the fixed terms leave no residuals.
+    Its fixed terms are an intercept, a slope on the mean of x (n) over each surface's trials, and another slope on the
+    difference of x from that mean (Mundlak 1978, Econometrica 46:69). A single slope would be that of the many strokes
+    on one surface, and the surfaces' levels would explain what this slope does not.
+
+    By maximum likelihood. None where x does not vary, or where the fixed terms leave no residuals.
     """
     covariate = np.asarray(x, np.float64) - np.mean(x)
-    size = float(np.abs(covariate).max())
-    if size <= 1e-12 * float(np.abs(x).max()):
+    size, noise = float(np.abs(covariate).max()), 1e-12 * float(np.abs(x).max())
+    if size <= noise:
         return None
     covariate /= size
     values, levels = np.asarray(y, np.float64), [indicator_columns(groups) for groups in (subjects, surfaces)]
     random = np.hstack(levels)
     if fits_exactly(np.column_stack([random, covariate]), values):
         return None
-    fixed = np.column_stack([np.ones(len(values)), covariate])
+    surface_mean = levels[1] @ (levels[1].T @ covariate / levels[1].sum(axis=0))
+    parts = [part for part in (surface_mean, covariate - surface_mean) if size * np.abs(part).max() > noise]
+    fixed = np.column_stack([np.ones(len(values)), *parts])
     factors = np.repeat([0, 1], [groups.shape[1] for groups in levels])
     patterns = np.array([np.diag((factors == group).astype(np.float64)) for group in (0, 1)])
     likelihood = _Likelihood.of(values, fixed, random, patterns, reml=False)
-    return likelihood.deviance(likelihood.maximum([np.array(spread) for spread in product(_STARTS, repeat=2)]))[0]
+    maximum = likelihood.maximum([np.array(spread) for spread in product(_STARTS, repeat=2)])
+    return likelihood.deviance(maximum)[0] + 2.0 * len(parts)
 
 
-def akaike_weights(deviances: Sequence[float]) -> tuple[float, ...]:
-    """Return the weights of models with equally many parameters (Wagenmakers & Farrell 2004, Psychon. Bull. Rev. 11).
+def akaike_weights(criteria: Sequence[float]) -> tuple[float, ...]:
+    """Return the weights of models by their Akaike criteria (Wagenmakers & Farrell 2004, Psychon. Bull. Rev. 11).
 
     >>> tuple(round(weight, 3) for weight in akaike_weights([204.0, 202.0, 206.0]))
     (0.245, 0.665, 0.09)
     """
-    return tuple(special.softmax(-0.5 * np.asarray(deviances, np.float64)).tolist())
+    return tuple(special.softmax(-0.5 * np.asarray(criteria, np.float64)).tolist())
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from drivers.arrays import Array
-from sessions.statistics.mixed_model import akaike_weights, crossed_deviance
+from sessions.statistics.mixed_model import akaike_weights, crossed_aic
 from sessions.statistics.scores import SCORE_SCALE
 from sessions.statistics.within_subjects import repeated_correlation
 
@@ -135,10 +135,12 @@ def study_weights(
     quantity: str,
     effects: AssumedEffects,
     draw: np.random.Generator,
+    own_share: float = 1.0,
 ) -> dict[str, float]:
     """Return the Akaike weight of each rival in one synthetic study of `people` drawn from `strokes` (people, trials).
 
-    Trials are ordered by depth, then by surface.
+    Trials are ordered by depth, then by surface. Scores follow the usual value of each trial, its mean over `strokes`,
+    and `own_share` of the stroke's difference from that.
     """
     sample = draw.choice(len(strokes[quantity]), people, replace=False)
     values = {name: population[sample] for name, population in strokes.items()}
@@ -149,16 +151,18 @@ def study_weights(
     slope = effects.effect / math.sqrt(12.0) * np.ones((people, 1))
     if effects.slope_sd:
         slope *= 1.0 + effects.slope_sd * draw.standard_normal((people, 1))
-    scores: Array = slope * (values[quantity] - finite.mean()) / finite.std()
+    usual = np.nanmean(strokes[quantity], axis=0)
+    perceived = usual + own_share * (values[quantity] - usual)
+    scores: Array = slope * (perceived - finite.mean()) / finite.std()
     scores += _MIDDLE + effects.level_sd * level + effects.noise * noise
     subjects, trials = np.nonzero(usable)
     surface_numbers = (trials % surfaces).tolist()
-    deviances = {
-        name: crossed_deviance(list(map(str, subjects)), surface_numbers, scores[usable].tolist(), x[usable].tolist())
+    criteria = {
+        name: crossed_aic(list(map(str, subjects)), surface_numbers, scores[usable].tolist(), x[usable].tolist())
         for name, x in values.items()
     }
-    known_deviances = {name: value for name, value in deviances.items() if value is not None}
-    return dict(zip(known_deviances, akaike_weights(list(known_deviances.values())), strict=True))
+    comparable = {name: value for name, value in criteria.items() if value is not None}
+    return dict(zip(comparable, akaike_weights(list(comparable.values())), strict=True))
 
 
 def twins(strokes: Mapping[str, Array], quantity: str) -> set[str]:

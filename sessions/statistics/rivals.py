@@ -21,7 +21,7 @@ from sessions.statistics.correlations import (
     required_cases,
     spearman,
 )
-from sessions.statistics.mixed_model import akaike_weights, crossed_deviance
+from sessions.statistics.mixed_model import akaike_weights, crossed_aic
 from sessions.statistics.scores import by_key, surface_means
 from sessions.statistics.within_subjects import repeated_correlation
 
@@ -58,7 +58,7 @@ class Rival:
     partial_high: float | None = None
     # Root mean square error of a surface's scores by the line through the others [points]
     left_out_error: float | None = None
-    weight: float | None = None  # Akaike's, of the mixed model with subjects and surfaces crossed
+    weight: float | None = None  # Akaike's, of the mixed model of `crossed_aic`
     # Orders the surfaces as the model's quantity, or exactly in reverse; None where it lacks one of them
     same_order: bool | None = None
     # Surfaces needed by Steiger's test to distinguish the two correlations of means; None without a test of these
@@ -111,15 +111,15 @@ def rivals_within(trials: Sequence[RivalTrial], model: str = MODEL_SED) -> tuple
     names = [name for name in _model_first(model) if any(name in trial.values for trial in model_trials)]
     if not model_trials:
         return ()
-    deviances = {name: _deviance(name, model_trials) for name in names}
-    comparable = {name: value for name, value in deviances.items() if not isinstance(value, str)}
+    criteria = {name: _akaike(name, model_trials) for name in names}
+    comparable = {name: value for name, value in criteria.items() if not isinstance(value, str)}
     weights = dict(zip(comparable, akaike_weights(list(comparable.values())), strict=True)) if comparable else {}
     return tuple(
         _because(
             replace(_within(name, model, model_trials), weight=weights.get(name)),
-            weight=deviance if isinstance(deviance, str) else None,
+            weight=criterion if isinstance(criterion, str) else None,
         )
-        for name, deviance in deviances.items()
+        for name, criterion in criteria.items()
     )
 
 
@@ -251,17 +251,17 @@ def _leave_surface_out_error(trials: Sequence[RivalTrial], name: str) -> float |
     return math.sqrt(float(np.mean(np.square(errors)))) if errors else None
 
 
-def _deviance(name: str, trials: Sequence[RivalTrial]) -> float | str:
-    """Return the deviance of the mixed model on a quantity, or why it has no comparable one."""
+def _akaike(name: str, trials: Sequence[RivalTrial]) -> float | str:
+    """Return Akaike's criterion of the mixed model on a quantity, or why it has no comparable one."""
     lack = sum(name not in trial.values for trial in trials)
     if lack:
         return f"{lack} of {len(trials)} trials have no such number, and AIC compares models of the same scores"
     subjects, surfaces = [trial.subject for trial in trials], [trial.index for trial in trials]
-    if min(len(set(subjects)), len(set(surfaces))) < 2 or len(trials) < 6:
-        return "too few subjects, surfaces or trials for a model of five parameters"
+    if len(set(subjects)) < 2 or len(set(surfaces)) < 3 or len(trials) < 7:
+        return "it takes two subjects, three surfaces and seven trials"
     x, y = [trial.values[name] for trial in trials], [trial.score for trial in trials]
-    deviance = crossed_deviance(subjects, surfaces, y, x)
-    return "it does not vary, or no residuals remain to estimate an error" if deviance is None else deviance
+    criterion = crossed_aic(subjects, surfaces, y, x)
+    return "it does not vary, or no residuals remain to estimate an error" if criterion is None else criterion
 
 
 def _because(rival: Rival, **reasons: str | None) -> Rival:

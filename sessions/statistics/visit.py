@@ -60,7 +60,7 @@ def exclusion_of(exclusions: tuple[Exclusion, ...], subject: str, descriptor: st
     return next((exclusion for exclusion in of_subject if exclusion.descriptor in ("", descriptor)), None)
 
 
-FORM = 12  # version of rows; stored rows of another version are computed again
+FORM = 13  # version of rows; stored rows of another version are computed again
 STILL_BLINDED = "still blinded, and is not counted until 'daq-app unblind' opens the key"
 NO_INTERVAL = "intervals of the SED were not requested"
 
@@ -124,6 +124,8 @@ class TrialRow:
     error_estimate: Annotated[Number, Meaning("", "of sed, from its mesh, relative")] = None
     tangential_force: Annotated[Number, Meaning("N", "measured, mean over the steady window")] = None
     responses: Mapping[str, float] = field(default_factory=dict[str, float])  # each quantity at the ending, by name
+    contact_area: Annotated[Number, Meaning("mm2", "by which tau_max was computed")] = None
+    indentation: Annotated[Number, Meaning("mm", "depth to which the model was pressed")] = None
     model_normal_force: Annotated[
         Number, Meaning("N", "of the model, pressed to the planned depth, times the finger's width")
     ] = None
@@ -269,6 +271,7 @@ def _friction_columns(friction: FrictionParameters, analysis: Analysis) -> dict[
         "mu_dynamic": stroke.mu_dynamic,
         "mu_static": stroke.mu_static,
         "tangential_force": stroke.tangential_force,
+        "contact_area": friction.contact_area,
     }
     for name, value, ends in (
         ("mu", friction.mu, intervals.mu_max if friction.rule == "maximum" else intervals.mu_dynamic),
@@ -290,6 +293,7 @@ def _prediction_columns(answer: TrialPrediction) -> dict[str, Any]:
         "sed_interval": NO_INTERVAL if interval is None else interval.reason or f"by {interval.method}",
         "error_estimate": answer.error_estimate,
         "responses": {name: response.value for name, response in answer.responses.items()},
+        "indentation": answer.indentation,
         "model_normal_force": answer.normal_force,
         "model_normal_force_error": answer.normal_force_error,
         "matching_depth": answer.matching_depth,

@@ -24,7 +24,9 @@ def trials(monkeypatch):
         )
         for trial, stroke in ((7, 0), (None, 1))
     ]
-    recording = SimpleNamespace(folder=Path("P01"), info=object(), simulated_sentence=None, plan=SimpleNamespace(blocks=["a"]))
+    recording = SimpleNamespace(
+        folder=Path("P01"), info=object(), simulated_sentence=None, plan=SimpleNamespace(blocks=["a"])
+    )
     prediction = SimpleNamespace(trials=rows, finger=None, to_dict=dict, options=PredictionOptions(intervals=True))
     monkeypatch.setattr(predict, "stored_options", lambda *_: PredictionOptions())
     monkeypatch.setattr(predict, "open_visit", lambda *_: (recording, (), ()))
@@ -62,7 +64,8 @@ def test_a_trial_without_an_sed_is_a_flaw_and_a_session_without_one_says_why(tri
     assert "nothing to predict: no stroke was found" in capsys.readouterr().out
 
 
-def test_a_recording_without_a_plan_needs_the_depth_of_the_press(trials, monkeypatch, capsys):
+@pytest.mark.usefixtures("trials")
+def test_a_recording_without_a_plan_needs_the_depth_of_the_press(monkeypatch, capsys):
     recording, *_ = predict.open_visit()
     monkeypatch.setattr(recording.plan, "blocks", [])
     assert run(["predict", "P01"]) == 2

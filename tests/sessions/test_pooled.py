@@ -88,7 +88,10 @@ def test_scores_that_fall_with_the_index_are_doubted_and_kept():
     findings = pool_visits([*VISITS[:9], visit(10, gain=-0.8)])
     assert [(subject, descriptor) for subject, descriptor, _ in findings.reversed] == [("S10", "stickiness")]
     assert findings.descriptors[0].scores[0].n == 10
-    assert summary(findings)[2] == "The scores of 1 of 10 subjects fall as the index rises; the appendix names each."
+    assert (
+        summary(findings)[2]
+        == "The stickiness scores of 1 of 10 subjects fall as the index rises; the appendix names each."
+    )
     assert not [sentence for sentence in summary(pool_visits(VISITS)) if "fall as" in sentence]
 
 

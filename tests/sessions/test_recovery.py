@@ -34,7 +34,7 @@ def test_scores_that_follow_nothing_prefer_each_of_three_about_equally_often(stu
 
 def test_scores_spread_with_the_true_quantity_by_the_effect_over_the_root_of_twelve(monkeypatch):
     scores = []
-    monkeypatch.setattr(power, "crossed_deviance", lambda _who, _what, y, _x: scores.append(y) or 0.0)
+    monkeypatch.setattr(power, "crossed_aic", lambda _who, _what, y, _x: scores.append(y) or 0.0)
     certain = AssumedEffects(30.0, noise=0.0, level_sd=0.0, slope_sd=0.0)
     recovery(strokes(1, 0.5), 12, DEPTHS, "sed", certain, 1, np.random.default_rng(2))
     assert np.std(scores[0]) == pytest.approx(30.0 / np.sqrt(12.0))  # as evenly over a range of 30

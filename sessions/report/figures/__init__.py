@@ -46,7 +46,10 @@ def picture(report: Report, plate: str, experiment: str | None = None) -> Panel 
 
 def _plate(report: Report, name: str) -> Plate:
     model = f" Model: {report.model}." if report.model and name in _OF_THE_MODEL else ""
-    caption_text = caption(f"figure-{name}", label=shown_response(report.response).label)
+    scored = [experiment for experiment in report.experiments if experiment.scores]
+    scores = " or ".join(dict.fromkeys(f"the {experiment.score_name}" for experiment in scored)) or "the score"
+    own = "Circles: scores of whoever made the strokes. " if any(e.own_scores for e in scored) else ""
+    caption_text = caption(f"figure-{name}", label=shown_response(report.response).label, scores=scores, own=own)
     return plate(name, caption_text + model, _PANELS[name](report))
 
 

@@ -113,7 +113,9 @@ def _relation(findings: DescriptorFindings, quantity: ShownResponse) -> Panel:
             axes.annotate(str(surface.index), (x, y), xytext=(5, 4), textcoords="offset points", zorder=4)
     axes.set(ylim=(-4, 109), yticks=_TICKS)
     axes.set(xlabel=f"predicted {quantity.label} [{quantity.unit}]", ylabel=f"score of {findings.descriptor} [0–100]")
-    within = "" if findings.repeated is None else f": within subjects r = {correlation(findings.repeated.r)}"
+    single = findings.single_subject
+    level = f"over the trials of {single}" if single else "within subjects"
+    within = "" if findings.repeated is None else f": {level} r = {correlation(findings.repeated.r)}"
     axes.set_title(f"{findings.descriptor}{within}\n{rival_title(findings.rivals)}".strip())
     title = f"Score of {findings.descriptor} against predicted {quantity.label}"
     header = ("subject", "index", f"{quantity.label} [{quantity.kept_unit}]", "score")

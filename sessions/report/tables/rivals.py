@@ -6,6 +6,7 @@ from textwrap import fill
 from sessions.report.tables import Row, Table, estimate_cell, number_cell, table
 from sessions.report.wording import NONE, capital, correlation, digits, p_value, places, plural
 from sessions.statistics.correlations import LEAST_OF_STEIGER, POWER
+from sessions.statistics.findings import DescriptorFindings
 from sessions.statistics.rivals import RESPONSES, Rival
 from sessions.statistics.scores import bounds
 from sessions.statistics.within_subjects import holm
@@ -21,14 +22,23 @@ RivalGroups = Sequence[tuple[str, Sequence[Rival]]]  # name of a group, and its 
 
 def rival_tables(groups: RivalGroups, quantity: str, model: str) -> tuple[Table | None, Table | None]:
     """Return tables of measured rivals of a quantity of the `model`, and of the model's other quantities."""
-    within = "Steiger (1980), within subjects by the jackknife" if _have_weights(groups) else "Steiger (1980)"
-    levels = "AIC: mixed models with levels of subjects and surfaces, which take up part of what surfaces differ in. "
-    aic = levels if _have_weights(groups) else ""
-    texts = {"label": quantity, "model": model, "within": within, "aic": aic}
+    weighed = _have_weights(groups)
+    within = "Steiger (1980), within subjects by the jackknife" if weighed else "Steiger (1980)"
+    aic = "AIC weight: share among these quantities, of which none need be right. " if weighed else ""
+    cases = "surfaces, within subjects trials" if weighed else "surfaces"
+    texts = {"label": quantity, "model": model, "within": within, "aic": aic, "cases": cases}
     return (
         _table("rivals", groups, texts, lambda name: name == quantity or name not in RESPONSES),
         _table("responses", groups, texts, lambda name: name != quantity and name in RESPONSES),
     )
+
+
+def levels_of_rivals(findings: DescriptorFindings) -> RivalGroups:
+    """Return the rivals of a study for means over subjects and within subjects; for one subject those of its scores."""
+    levels = [("means over subjects", findings.rivals_of_means), ("within subjects", findings.rivals)]
+    if findings.single_subject:
+        levels = [(f"scores of {findings.single_subject}", findings.rivals_of_means)]
+    return [(f"{findings.descriptor}, {level}", rivals) for level, rivals in levels]
 
 
 def _have_weights(groups: RivalGroups) -> bool:

@@ -253,8 +253,11 @@ def paths_table(path_groups: Iterable[tuple[str, Sequence[PathFinding]]]) -> Tab
     return table("table-paths", "paths", columns, groups, same=SAME)
 
 
-def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:
-    """Return a sentence on the distribution of the correlation, and the number of paths with the opposite sign."""
+def paths_sentence(name: str, findings: Sequence[PathFinding], single_subject: str = "") -> str:
+    """Return a sentence on the distribution of the correlation, and the number of paths with the opposite sign.
+
+    `single_subject` is the code of the only subject of a study.
+    """
     values = correlations(findings)
     summary = five_number_summary(values)
     usual_values = [r for r, finding in zip(values, findings, strict=True) if finding.usual]
@@ -269,7 +272,8 @@ def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:
     distinct = summary.distinct
     difference = "all agree within" if distinct == 1 else f"{distinct} of these differ by more than"
     least, median, greatest = map(correlation, (summary.least, summary.median, summary.greatest))
-    level = "over surfaces" if all(finding.within is None for finding in findings) else "within subjects"
+    level = f"over the trials of {single_subject}" if single_subject else "within subjects"
+    level = "over surfaces" if all(finding.within is None for finding in findings) else level
     return (
         f"{start} {summary.correlated} give a correlation {level}, from {least} to {greatest}, "
         f"median {median}{sign_clause}; {difference} {SAME:g}."

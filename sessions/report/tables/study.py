@@ -7,7 +7,7 @@ from operator import itemgetter
 
 from sessions.prediction import BY_NAME
 from sessions.report.tables import Cell, Format, Row, Table, number_cell, range_cell, sections_of, table
-from sessions.report.tables.rivals import rival_tables
+from sessions.report.tables.rivals import levels_of_rivals, rival_tables
 from sessions.report.tables.scales import latent_table, psychometric_table, scales_table, study_functions
 from sessions.report.tables.session import paths_table, rank_interval, score_cells, spread_cell
 from sessions.report.tables.study_models import (
@@ -95,7 +95,7 @@ def _scores(study: StudyFindings) -> Table | None:
         "within subjects [0–100] | standard deviation [0–100]"
     )
     complete = ", ".join(f"{d.within[0].n} for {d.descriptor}" for d in study.descriptors if d.within)
-    return _table(study, "table-scores", "study-scores", columns, rows, complete=complete or "none")
+    return _table(study, "table-scores", "study-scores", columns, rows, complete=complete or "fewer than two")
 
 
 def _agreement(study: StudyFindings) -> Table | None:
@@ -212,6 +212,12 @@ def _relation(study: StudyFindings) -> Table | None:
 
     def rows(findings: DescriptorFindings) -> tuple[Row, ...]:
         of_estimates = None if findings.estimates is None else findings.estimates.repeated
+        if findings.single_subject:
+            return (
+                *_of_means(f"scores of {findings.single_subject}", findings.mean_relation),
+                *_within_subjects("its single trials", findings.repeated),
+                *_within_subjects("within, log estimates", of_estimates),
+            )
         return (
             *_of_means("means", findings.mean_relation),
             *_of_means("means, standardised", findings.normalised.mean_relation),
@@ -225,11 +231,7 @@ def _relation(study: StudyFindings) -> Table | None:
 
 
 def _rivals(study: StudyFindings) -> tuple[Table | None, ...]:
-    rival_groups = [
-        (f"{findings.descriptor}, {level}", rivals)
-        for findings in study.descriptors
-        for level, rivals in (("means over subjects", findings.rivals_of_means), ("within subjects", findings.rivals))
-    ]
+    rival_groups = [group for findings in study.descriptors for group in levels_of_rivals(findings)]
     return rival_tables(rival_groups, BY_NAME[study.response].label, study_model(study))
 
 
