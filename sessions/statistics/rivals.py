@@ -146,7 +146,7 @@ def _mean_rival(name: str, model: str, scores: Mapping[int, float], series: Mapp
     xy, xz, yz = pearson(values[name], score), pearson(values[name], values[MODEL_MU]), pearson(score, values[MODEL_MU])
     partial = math.nan if xy is None or xz is None or yz is None else float(partial_correlation(xy, xz, yz))
     if math.isnan(partial):
-        return _because(rival, partial="µ determines it, or there are too few surfaces")
+        return _because(rival, partial="µ determines it, one of them does not vary, or there are too few surfaces")
     low, high = fisher_interval(partial, len(indices) - 1)
     return replace(rival, partial=partial, partial_low=low, partial_high=high)
 

@@ -17,16 +17,19 @@ MOST_NAMED = 3  # number of responses from which they are counted, not named
 _TITLE_WIDTH = 44  # characters in a line of a picture's title
 
 
+_WITHIN = " Within subjects n counts trials, and intervals and tests are by the jackknife over subjects."
+_AIC = (
+    "AIC weight: a share among these quantities, of which none need be right, by mixed models with one slope between "
+    "surfaces and one within. "
+)
+
 RivalGroups = Sequence[tuple[str, Sequence[Rival]]]  # name of a group, and its rivals
 
 
 def rival_tables(groups: RivalGroups, quantity: str, model: str) -> tuple[Table | None, Table | None]:
     """Return tables of measured rivals of a quantity of the `model`, and of the model's other quantities."""
     weighed = _have_weights(groups)
-    within = "Steiger (1980), within subjects by the jackknife" if weighed else "Steiger (1980)"
-    aic = "AIC weight: share among these quantities, of which none need be right. " if weighed else ""
-    cases = "surfaces, within subjects trials" if weighed else "surfaces"
-    texts = {"label": quantity, "model": model, "within": within, "aic": aic, "cases": cases}
+    texts = {"label": quantity, "model": model, "within": _WITHIN if weighed else "", "aic": _AIC if weighed else ""}
     return (
         _table("rivals", groups, texts, lambda name: name == quantity or name not in RESPONSES),
         _table("responses", groups, texts, lambda name: name != quantity and name in RESPONSES),
