@@ -33,7 +33,8 @@ _NumberOf = Callable[[PredictionFinding], float | None]
 
 def doubts(report: Report) -> tuple[str, ...]:
     """Return sentences on what would change the sign of r between prediction and scores; empty without an r."""
-    if all(p.sed is None for p in report.predictions) or not report.scored:
+    relations = [experiment.score_relation for experiment in report.experiments]
+    if all(relation is None or relation.pearson is None for relation in relations):
         return ()
     strain: Kinematics = "small" if report.model.startswith("small") else "finite"
     other_strain: Kinematics = "finite" if strain == "small" else "small"
@@ -152,6 +153,12 @@ def summary(report: Report) -> tuple[str, ...]:
         sentences.append(f"{plural(len(subjects), 'subject')} scored {plural(stimuli, 'stimulus', 'stimuli')}.")
     if report.course is not None or report.strokes:
         sentences.append(_strokes(report))
+    by_descriptor = by_key((e.descriptor, e.name) for e in report.experiments if e.scores)
+    sentences += [
+        f"{capital(' and '.join(names))} judge {descriptor} alike: a surface's score is its mean over these blocks."
+        for descriptor, names in by_descriptor.items()
+        if len(names) > 1
+    ]
     for results in session_functions(report):
         sentences += psychometric_sentences(results)
     for experiment in report.experiments:

@@ -110,9 +110,11 @@ def _relation_sentences(findings: DescriptorFindings, study: StudyFindings) -> l
     falling = sum(descriptor == findings.descriptor for _, descriptor, _ in study.reversed)
     people = findings.single_subject or plural(len({subject for subject, *_ in findings.points}), "subject")
     level = "" if findings.single_subject else "within subjects, "
+    surfaces = plural(len({index for _, index, *_ in findings.points}), "surface")
     return [
         f"{name}: {level}score and the {label} predicted at {strain} strain go together by "
-        f"r = {correlation(repeated.r)} over {plural(len(findings.points), 'trial')} of {people}, {interval}; "
+        f"r = {correlation(repeated.r)} over {plural(len(findings.points), 'trial')} of {people} on {surfaces}, "
+        f"{interval}; "
         f"{_otherwise(findings, other_strain)}.",
         *([reversal_sentence(findings.descriptor, falling, len(findings.answers))] if falling else []),
     ]
@@ -221,31 +223,31 @@ _SETTINGS: Mapping[str, Callable[[TrialRow], str]] = {
 
 
 def _different_settings(study: StudyFindings) -> list[str]:
-    """Return a sentence for each descriptor whose counted sessions predict with different settings."""
+    """Return a sentence for each descriptor whose counted trials are predicted with different settings."""
     sentences: list[str] = []
     copies = dict(study.copies)
     for findings in study.descriptors:
+        name = findings.descriptor
         rows = [
-            (
-                visit.session,
-                [row for row in visit.rows if row.descriptor == findings.descriptor and row.sed is not None],
-            )
+            (visit.session, [row for row in visit.rows if row.descriptor == name and row.sed is not None])
             for visit in study.visits
-            if visit.session not in copies and exclusion_of(study.excluded, visit.subject, findings.descriptor) is None
+            if visit.session not in copies and exclusion_of(study.excluded, visit.subject, name) is None
         ]
         clauses: list[str] = []
-        for name, text in _SETTINGS.items():
-            if name == "contact area" and study.options.area != FIXED:
-                continue  # it differs by force
-            groups = by_key((", ".join(sorted(set(map(text, trials)))), session) for session, trials in rows if trials)
-            if len(groups) > 1:
-                values = (f"{value}: {_first_few(sessions)}" for value, sessions in groups.items())
-                clauses.append(f"{name} ({'; '.join(values)})")
+        for setting, text in _SETTINGS.items():
+            if setting == "contact area" and study.options.area != FIXED:
+                continue  # it grows with the force of each stroke
+            values = by_key(
+                (" and ".join(sorted(set(map(text, trials)))), session) for session, trials in rows if trials
+            )
+            parts = [f"{value}: {_first_few(sessions)}" for value, sessions in values.items()]
+            if len(values) == 1:
+                parts = [f"{value} in each session" for value in values if " and " in value]
+            clauses += [f"{setting} ({'; '.join(parts)})"] if parts else []
         if clauses:
             sentences.append(
-                f"Predictions for {findings.descriptor} have different settings in different sessions: "
-                f"{', '.join(clauses)}. Means, correlations and models pool them, and part of the differences between "
-                "subjects may come from these settings."
+                f"Trials on {name} are predicted with different settings: {', '.join(clauses)}. Means, correlations "
+                "and models pool them, so part of the differences between trials may come from these settings."
             )
     return sentences
 

@@ -320,7 +320,7 @@ def test_the_headline_counts_the_trials_of_its_correlations_alone():
         for v in map(opposite, VISITS[:4])
     ]
     sentence = summary(pool_visits(visits))[1]
-    assert " over 16 trials of 4 subjects, 95 % interval" in sentence
+    assert " over 16 trials of 4 subjects on 5 surfaces, 95 % interval" in sentence
     assert sentence.endswith("over the 16 trials with a prediction there.")
 
 
@@ -335,7 +335,7 @@ def test_scored_strokes_without_a_prediction_are_not_said_to_be_missing():
 def test_a_perfect_r_of_many_subjects_has_no_interval_for_that_reason():
     exact = [replace(v, rows=tuple(replace(r, score=1e4 * (r.sed - 0.004)) for r in v.rows)) for v in VISITS]
     assert (
-        "r = +1.00 over 50 trials of 10 subjects, no interval, since subjects are alike or r is perfect;"
+        "r = +1.00 over 50 trials of 10 subjects on 5 surfaces, no interval, since subjects are alike or r is perfect;"
         in summary(pool_visits(exact))[1]
     )
 

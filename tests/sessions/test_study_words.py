@@ -25,7 +25,7 @@ def texts_of(study):
 def test_a_study_of_one_subject_names_it_and_speaks_of_no_others():
     study = pool_visits([visit(1)])
     words = texts_of(study)
-    assert "over 5 trials of S01, no interval for other people from one subject;" in words
+    assert "over 5 trials of S01 on 5 surfaces, no interval for other people from one subject;" in words
     assert "On stickiness, scores of S01, the scores" in words or "Stickiness, scores of S01" in words
     for phrase in ("within subjects", "over subjects", "1 subject with", "AIC"):
         assert phrase not in words.replace("No intervals within subjects", "")
@@ -84,8 +84,29 @@ def test_sessions_pooled_with_unlike_settings_are_named_with_what_differs():
 
 
 def test_like_settings_and_sessions_left_out_get_no_remark():
-    deep = [replace(pressed(1, 2.0).rows[0], indentation=1.5), *pressed(1, 2.0).rows[1:]]
-    both = [replace(visit(number), rows=tuple(deep)) for number in (1, 2)]
     left_out = (Exclusion("S03", "pressed less deeply", "E01"),)
-    for study in (pool_visits(both), pool_visits([pressed(1, 2.0), pressed(3, 1.5)], exclusions=left_out)):
+    alike = pool_visits([pressed(1, 2.0), pressed(2, 2.0)])
+    for study in (alike, pool_visits([pressed(1, 2.0), pressed(3, 1.5)], exclusions=left_out)):
         assert not [text for text in remarks(study) if "different settings" in text]
+
+
+def test_two_depths_within_each_session_are_named_too():
+    mixed = [(replace(v.rows[0], indentation=1.5), *v.rows[1:]) for v in (pressed(1, 2.0), pressed(2, 2.0))]
+    study = pool_visits([replace(visit(number), rows=rows) for number, rows in enumerate(mixed, 1)])
+    (sentence,) = [text for text in remarks(study) if "different settings" in text]
+    assert "different settings: depth of the model (1.5 mm and 2 mm in each session)." in sentence
+
+
+def test_a_session_of_two_blocks_on_one_descriptor_says_whose_mean_a_score_is():
+    stickiness = experiments_of(tables(1))[0]
+    twice = (stickiness, replace(stickiness, name="back"))
+    sentences = prose.summary(example(experiments=twice))
+    assert "Stickiness and back judge stickiness alike: a surface's score is its mean over these blocks." in sentences
+    assert not [text for text in prose.summary(example()) if "mean over these blocks" in text]
+
+
+def test_without_a_correlation_nothing_would_change_its_sign():
+    (stickiness, _) = experiments_of(tables(1))
+    alone = replace(stickiness.score_relation, pearson=None)
+    assert prose.doubts(example())
+    assert prose.doubts(example(experiments=(replace(stickiness, score_relation=alone),))) == ()
