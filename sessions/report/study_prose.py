@@ -210,7 +210,7 @@ def remarks(study: StudyFindings) -> list[str]:
         "used backwards, or these scores may follow no order."
         for subject, descriptor, r in study.reversed
     ]
-    return [*sentences, *_different_settings(study), *_meshes(study)]
+    return [*sentences, *_doubtful_trials(study), *_different_settings(study), *_meshes(study)]
 
 
 # What sets a prediction besides a stroke's friction, and its text
@@ -284,6 +284,18 @@ def _range_of(shares: Sequence[float]) -> str:
 
 def _trials_of(exclusion: Exclusion) -> str:
     return f"trials on {exclusion.descriptor}" if exclusion.descriptor else "every trial"
+
+
+def _doubtful_trials(study: StudyFindings) -> list[str]:
+    """Return a sentence on trials whose prediction counts, though no finger can be in its state."""
+    doubts = [(f"{v.session} trial {row.trial}", row.doubt) for v in study.visits for row in v.rows if row.doubt]
+    if not doubts:
+        return []
+    names, sentence = _first_few([name for name, _ in doubts]), doubts[0][1]
+    return [
+        f"Predictions of {plural(len(doubts), 'trial')} are of a state that no finger can be in, and count "
+        f"nevertheless ({names}). {'Of the first: ' if len(doubts) > 1 else ''}{full_stop(sentence)}"
+    ]
 
 
 def _trials_without_sed(study: StudyFindings) -> list[str]:

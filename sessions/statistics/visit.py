@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 from sessions.plan.plan import Blinded, Block
 from sessions.prediction import BY_NAME, SED, PredictionOptions, SessionPrediction, TrialPrediction, predict
+from sessions.prediction.scenes import doubt_of
 from sessions.prediction.sealed_predictions import SEAL_NUMBERS, sealed_sentence
 from sessions.prediction.stored import Number, model_facts
 from sessions.prediction.uncertainty import with_intervals
@@ -137,6 +138,7 @@ class TrialRow:
         tuple[str, ...], Meaning("", "names of the flaws graded doubtful or worse, with blanks between")
     ] = ()
     why: Annotated[str, Meaning("", "why there is no SED")] = ""
+    doubt: Annotated[str, Meaning("", "why no finger can be in the state of the model; empty where one can")] = ""
     paths: Values = ()  # a quantity along each of `sessions.statistics.multiverse.PATHS`, where requested
 
     def response(self, quantity: str) -> float | None:
@@ -298,4 +300,5 @@ def _prediction_columns(answer: TrialPrediction) -> dict[str, Any]:
         "model_normal_force_error": answer.normal_force_error,
         "matching_depth": answer.matching_depth,
         "why": answer.reasons.get("sed", ""),
+        "doubt": "" if answer.prediction is None else doubt_of(answer.prediction),
     }
