@@ -293,8 +293,8 @@ def _doubtful_trials(study: StudyFindings) -> list[str]:
         return []
     names, sentence = _first_few([name for name, _ in doubts]), doubts[0][1]
     return [
-        f"Predictions of {plural(len(doubts), 'trial')} are of a state that no finger can be in, and count "
-        f"nevertheless ({names}). {'Of the first: ' if len(doubts) > 1 else ''}{full_stop(sentence)}"
+        f"Predictions of {plural(len(doubts), 'trial')} are, on their meshes, of a state that no finger can be in, and "
+        f"count nevertheless ({names}). {'Of the first: ' if len(doubts) > 1 else ''}{full_stop(sentence)}"
     ]
 
 
