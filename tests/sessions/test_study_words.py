@@ -94,9 +94,10 @@ def test_trials_in_a_state_that_no_finger_can_be_in_are_counted_and_named():
     doubt = "Tissue is turned inside out somewhere"
     study = pool_visits([pressed(1, 2.0, doubt=doubt), pressed(2, 2.0)])
     (sentence,) = [text for text in remarks(study) if "no finger can be in" in text]
-    assert sentence.startswith(
-        "Predictions of 5 trials are of a state that no finger can be in, and count nevertheless"
+    opening = (
+        "Predictions of 5 trials are, on their meshes, of a state that no finger can be in, and count nevertheless"
     )
+    assert sentence.startswith(opening)
     assert "(S01 trial 1, S01 trial 2, S01 trial 3, S01 trial 4, S01 trial 5)" in sentence
     assert sentence.endswith(f"Of the first: {doubt}.")
     assert not [text for text in remarks(pool_visits([pressed(2, 2.0)])) if "no finger can be in" in text]
