@@ -185,7 +185,7 @@ def attend_session(recorder: Recorder, request: m.StartSession | m.ResumeSession
     """Attend a session until it is sealed or cut short; people answer at this terminal unless they are simulated.
 
     A stop is passed on immediately. A second one ends the wait for the sealing, which the recorder finishes alone, or
-    for a recorder that does not answer (RecordingKept). Raises RecordingKept too if the recorder ends during the
+    for a recorder that does not answer (RecordingKept). Raises RecordingKept too if recorder or disk fail during the
     session, and as a driver does, RecordingError, WrongValue.
     """
     recorder.send(request)
@@ -264,6 +264,8 @@ class _Attendance:
                 raise LinkLost(sentence)  # it opened but does not stream
             case m.Failed() if self._stopping and self._start is None:
                 raise KeyboardInterrupt  # as requested, before anything was recorded
+            case m.Failed(_, sentence, "DiskRefused") if self._start is not None:
+                raise RecordingKept(sentence)
             case m.Failed() | m.Gone():
                 _raise_failure(report, "" if self._start is None else self._start.folder)
             case _ if isinstance(report, Command) and self._terminal is not None:

@@ -86,6 +86,8 @@ def test_a_failure_of_the_recorder_is_that_of_the_command_line(report, error):
         attend(([report], 0.0))
 
 
-def test_a_recorder_that_ends_during_a_session_leaves_a_sentence_that_names_its_folder():
+def test_a_recorder_or_a_disk_that_fails_during_a_session_keeps_what_was_recorded():
     with pytest.raises(RecordingKept, match="resume the session, with 'daq-app resume here'"):
         attend(([BEGUN], 0.0), ([m.Gone(False, "resume the session")], 0.0))
+    with pytest.raises(RecordingKept, match="the disk took no more"):
+        attend(([BEGUN], 0.0), ([m.Failed("StartSession", "the disk took no more", "DiskRefused")], 0.0))
