@@ -264,8 +264,6 @@ class _Attendance:
                 raise LinkLost(sentence)  # it opened but does not stream
             case m.Failed() if self._stopping and self._start is None:
                 raise KeyboardInterrupt  # as requested, before anything was recorded
-            case m.Failed(_, sentence, "DiskRefused") if self._start is not None:
-                raise RecordingKept(sentence)
             case m.Failed() | m.Gone():
                 _raise_failure(report, "" if self._start is None else self._start.folder)
             case _ if isinstance(report, Command) and self._terminal is not None:
@@ -284,6 +282,8 @@ class _Attendance:
 def _raise_failure(report: m.Report, folder: str = "") -> None:
     """Raise the failure in a report, of a session in `folder` if any, as the command line expects it."""
     match report:
+        case m.Failed(_, sentence, "DiskRefused") if folder:
+            raise RecordingKept(sentence)
         case m.Failed(_, sentence, kind):
             raise _FAILURES.get(kind, RecordingError)(sentence)
         case m.Gone(_, sentence):
