@@ -199,9 +199,11 @@ class Keyboard(QObject):
         return watched is self._subject and key_owner == "course" and self.press(event)
 
     def _pressed_twice(self, event: QKeyEvent) -> bool:
-        """Say whether a key is a double press of the one that gave the answer, by the system's interval."""
+        """Say whether a key repeats the one that gave the answer, without a pause of the system's double-click."""
         soon = self._since_answer.isValid() and self._since_answer.elapsed() < QApplication.doubleClickInterval()
-        return soon and event.key() == self._subject.answer_key
+        if repeated := soon and event.key() == self._subject.answer_key:
+            self._since_answer.start()
+        return repeated
 
     def _focus_changed(self, previous: QWidget | None, now: QWidget | None) -> None:
         came_here = now is not None and now.window() is self._window

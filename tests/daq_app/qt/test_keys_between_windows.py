@@ -6,11 +6,12 @@ import time
 from dataclasses import replace
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QElapsedTimer, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton
 
+from daq_app.qt.keys import Keyboard
 from daq_app.qt.preferences import settings
 from daq_app.qt.start import SIMULATED_BENCH
 from daq_app.recorder.messages import Connect, Disconnect
@@ -151,6 +152,35 @@ def test_the_key_that_gave_the_answer_pressed_twice_does_not_go_on_with_the_cour
             assert messages == [driver.view.course.primary.sends]
     finally:
         QApplication.setDoubleClickInterval(interval)
+
+
+def test_the_key_that_gave_the_answer_pressed_twenty_times_in_a_row_is_one_answer(driver, monkeypatch):
+    window, now, messages = driver.window, [0], []
+
+    class Timer(QElapsedTimer):
+        """A stopwatch on the time of the test [ms]."""
+
+        def start(self):
+            super().start()
+            self.began = now[0]
+
+        def elapsed(self):
+            return now[0] - self.began
+
+    begin_scoring(driver)
+    keyboard = window.findChild(Keyboard)
+    monkeypatch.setattr(keyboard, "_since_answer", Timer())
+    driver.answer(Qt.Key.Key_Right)
+    keyboard._since_answer.start()
+    monkeypatch.setattr(window.bridge, "send", messages.append)
+    for _ in range(20):
+        now[0] += QApplication.doubleClickInterval() // 2
+        QTest.keyClick(window.subject, ENTER)
+    assert messages == []
+    now[0] += QApplication.doubleClickInterval()
+    QTest.keyClick(window.subject, ENTER)
+    assert messages == [driver.view.course.primary.sends]
+    monkeypatch.undo()
 
 
 def test_a_reason_that_is_typed_while_the_course_goes_on_discards_no_other_trial_than_the_one_asked_about(driver):
