@@ -141,14 +141,15 @@ class Dialogue:
         In a pause none is taken, because the tablet sends it again when its question is repeated.
         """
         session, page, key = self._session, self._page, answer.key
-        if session is None or session.is_over or page is None or key in self._open_keys or self._acknowledge(key):
+        if session is None or session.is_over or page is None or self._acknowledge(key):
             return None
-        if session.phase == "paused":
+        if session.phase == "paused" or (key == page.key and key in self._open_keys):
             return None
         event = event_of(answer.acts, clock, session.plan.answering_hand)
         if key == page.key and isinstance(event, _ANSWERS[page.view.kind]):
             self._open_keys.add(key)
             return event
+        self._open_keys.discard(key)
         self._send(Stored(key))
         return Note(f"The tablet answered a question that was no longer open ({key}): {structs.astuple(event)[0]}")
 

@@ -79,6 +79,15 @@ def test_an_answer_that_comes_too_late_is_written_down_as_a_note():
     assert Stored(key) in tablet.messages
 
 
+def test_an_answer_that_a_redo_crosses_is_acknowledged_and_written_down_as_a_note():
+    tablet = Tablet()
+    key = tablet.show(*SCORE).key
+    assert isinstance(tablet.give(key), steps.Scored)
+    tablet.show(*SCORE, log("take_discarded", 1, reason="redo"), steps.AskMount(FIRST))
+    assert isinstance(tablet.give(key), steps.Note)
+    assert tablet.messages.count(Stored(key)) == 1
+
+
 def test_an_answer_waits_on_the_tablet_while_no_session_runs():
     tablet = Tablet()
     key = tablet.show(*SCORE).key
