@@ -9,16 +9,19 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # multiprocessing is slow to import, and most verbs start no process
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing.context import SpawnContext
     from multiprocessing.process import BaseProcess
+    from multiprocessing.synchronize import Lock
 
 _BELOW = 5  # increment of nice on POSIX
 BELOW_NORMAL = 0x4000  # priority class on Windows
 MOST_WORKERS = 61  # on Windows, which can wait for no more processes (Python's ProcessPoolExecutor)
+COMPILATION = "solver._kernels"  # logger of the warning that loops are compiled
 SAFE_PATH = "PYTHONSAFEPATH"  # environment variable with the effect of -P
 
 
@@ -84,13 +87,22 @@ def process_pool(workers: int) -> "ProcessPoolExecutor":
     from concurrent.futures import ProcessPoolExecutor
 
     workers = min(workers, MOST_WORKERS) if sys.platform == "win32" else workers
-    return ProcessPoolExecutor(workers, fresh_processes(), initializer=_attend_parent)
+    return ProcessPoolExecutor(workers, fresh_processes(), initializer=_attend_parent, initargs=(_first_message(),))
 
 
-def _attend_parent() -> None:
-    """Ignore Ctrl-C, which the parent handles, and end if the parent is killed."""
+@cache
+def _first_message() -> "Lock":
+    """Return what the first process of a command takes that warns of a compilation: the others stay silent."""
+    return fresh_processes().Lock()
+
+
+def _attend_parent(first_message: "Lock") -> None:
+    """Ignore Ctrl-C, which the parent handles, end if the parent is killed, and repeat no warning of other workers."""
+    import logging  # here, because only workers need it
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    logging.getLogger(COMPILATION).addFilter(lambda _: first_message.acquire(block=False))
 
 
 def _end_with_parent() -> None:
