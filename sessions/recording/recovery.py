@@ -212,6 +212,8 @@ def fold_log(folder: Path, events: Sequence[LoggedEvent]) -> None:
                 connection.execute("INSERT INTO events VALUES (?,?,?,?,?,?,?)", event_row(event))
             connection.execute("COMMIT")
             connection.execute("PRAGMA journal_mode=DELETE")
+            with suppress(OSError):  # the crashed program's index of the log; this connection had its own
+                live.with_name(f"{live.name}-shm").unlink(missing_ok=True)
     except sqlite3.Error as error:
         code = error.sqlite_errorcode & 0xFF  # the low byte
         if code not in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):

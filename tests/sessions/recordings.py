@@ -44,7 +44,7 @@ def record_crash(folder, commits):
         writer.readings(readings(100 * i, 100, received_ns=i))
         writer.commit()
     folder.mkdir()
-    for name in ("session.sqlite", "session.sqlite-wal"):
+    for name in ("session.sqlite", "session.sqlite-wal", "session.sqlite-shm"):
         shutil.copy(live / name, folder)
     writer.close()
     return folder

@@ -16,7 +16,7 @@ from recordings import PLAN, change, new_writer, readings, record_crash, record_
 from stand_ins import CALIBRATION, INFO
 
 from sessions.recording import Recording, RecordingError
-from sessions.recording.archive import problems, seal
+from sessions.recording.archive import SEALED, problems, seal
 from sessions.recording.manifest import list_in_manifest
 from sessions.recording.sealed_copy import read_texts, write_texts
 
@@ -371,7 +371,7 @@ def test_a_session_cut_short_by_a_crash_is_sealed_with_all_that_was_safe_and_its
     assert "hold no whole commit" in losses[0]
     assert losses[1].startswith("the session has no end")
     assert problems(folder) == tuple(losses)
-    assert not log.exists()
+    assert {path.name for path in folder.iterdir()} == {*SEALED, "MANIFEST.json"}
 
 
 def test_a_torn_log_behind_a_damaged_event_is_sealed_with_both_named(tmp_path):
