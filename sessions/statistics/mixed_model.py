@@ -168,13 +168,14 @@ def fits_exactly(design: Array, y: Array) -> bool:
 
 
 def crossed_aic(
-    subjects: Sequence[str], surfaces: Sequence[int], y: Sequence[float], x: Sequence[float]
+    subjects: Sequence[str], surfaces: Sequence[int], conditions: Sequence[str], y: Sequence[float], x: Sequence[float]
 ) -> float | None:
     """Return Akaike's criterion, up to a constant, of a model of y (n) with levels of subjects and surfaces and error.
 
-    Its fixed terms are an intercept, a slope on the mean of x (n) over each surface's trials, and another slope on the
-    difference of x from that mean (Mundlak 1978, Econometrica 46:69). A single slope would be that of the many strokes
-    on one surface, and the surfaces' levels would explain what this slope does not.
+    Its fixed terms are an intercept, a slope on the mean of x (n) over the trials of each condition, and another slope
+    on the difference of x from that mean (Mundlak 1978, Econometrica 46:69). `conditions` (n) are those of all
+    subjects, such as a surface at a depth. A single slope would be that of the many strokes in one condition, and the
+    surfaces' levels would explain what this slope does not.
 
     By maximum likelihood. None where x does not vary, or where the fixed terms leave no residuals.
     """
@@ -187,8 +188,9 @@ def crossed_aic(
     random = np.hstack(levels)
     if fits_exactly(np.column_stack([random, covariate]), values):
         return None
-    surface_mean = levels[1] @ (levels[1].T @ covariate / levels[1].sum(axis=0))
-    parts = [part for part in (surface_mean, covariate - surface_mean) if size * np.abs(part).max() > noise]
+    alike = indicator_columns(conditions)
+    usual = alike @ (alike.T @ covariate / alike.sum(axis=0))
+    parts = [part for part in (usual, covariate - usual) if size * np.abs(part).max() > noise]
     fixed = np.column_stack([np.ones(len(values)), *parts])
     factors = np.repeat([0, 1], [groups.shape[1] for groups in levels])
     patterns = np.array([np.diag((factors == group).astype(np.float64)) for group in (0, 1)])

@@ -112,7 +112,9 @@ def _descriptor(
     pairs = choices(trials)
     paired = tuple(scales.paired_scale(pairs, model) for model in scales.MODELS) if pairs else ()
     comparisons = constant_stimuli(trials)
-    rival_trials = [RivalTrial(subject, row.index, score, rival_values(row)) for subject, row, _, score in points]
+    rival_trials = [
+        RivalTrial(subject, row.index, score, rival_values(row), row.block) for subject, row, _, score in points
+    ]
     return DescriptorFindings(
         descriptor=name,
         indices=indices,

@@ -156,11 +156,8 @@ def study_weights(
     scores: Array = slope * (perceived - finite.mean()) / finite.std()
     scores += _MIDDLE + effects.level_sd * level + effects.noise * noise
     subjects, trials = np.nonzero(usable)
-    surface_numbers = (trials % surfaces).tolist()
-    criteria = {
-        name: crossed_aic(list(map(str, subjects)), surface_numbers, scores[usable].tolist(), x[usable].tolist())
-        for name, x in values.items()
-    }
+    groups = list(map(str, subjects)), (trials % surfaces).tolist(), list(map(str, trials))
+    criteria = {name: crossed_aic(*groups, scores[usable].tolist(), x[usable].tolist()) for name, x in values.items()}
     comparable = {name: value for name, value in criteria.items() if value is not None}
     return dict(zip(comparable, akaike_weights(list(comparable.values())), strict=True))
 

@@ -74,6 +74,7 @@ class RivalTrial:
     index: int
     score: float
     values: Mapping[str, float]
+    block: str = ""  # in which it was stroked: one depth and direction
 
 
 def rivals_of_means(
@@ -260,7 +261,8 @@ def _akaike(name: str, trials: Sequence[RivalTrial]) -> float | str:
     if len(set(subjects)) < 2 or len(set(surfaces)) < 3 or len(trials) < 7:
         return "it takes two subjects, three surfaces and seven trials"
     x, y = [trial.values[name] for trial in trials], [trial.score for trial in trials]
-    criterion = crossed_aic(subjects, surfaces, y, x)
+    conditions = [f"{trial.index} {trial.block}" for trial in trials]
+    criterion = crossed_aic(subjects, surfaces, conditions, y, x)
     return "it does not vary, or no residuals remain to estimate an error" if criterion is None else criterion
 
 

@@ -34,7 +34,7 @@ def test_scores_that_follow_nothing_prefer_each_of_three_about_equally_often(stu
 
 def test_scores_spread_with_the_true_quantity_by_the_effect_over_the_root_of_twelve(monkeypatch):
     scores = []
-    monkeypatch.setattr(power, "crossed_aic", lambda _who, _what, y, _x: scores.append(y) or 0.0)
+    monkeypatch.setattr(power, "crossed_aic", lambda _who, _what, _condition, y, _x: scores.append(y) or 0.0)
     certain = AssumedEffects(30.0, noise=0.0, level_sd=0.0, slope_sd=0.0)
     recovery(strokes(1, 0.5), 12, DEPTHS, "sed", certain, 1, np.random.default_rng(2))
     assert np.std(scores[0]) == pytest.approx(30.0 / np.sqrt(12.0))  # as evenly over a range of 30
@@ -62,3 +62,15 @@ def test_the_verb_simulates_studies_at_the_depths_asked_for(capsys, monkeypatch)
     assert "4 × 3 × 2" in printed
     assert run([*easy, "9"]) == 2
     assert "--depths" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("quantity", ["sed", "shear"])
+def test_a_quantity_is_preferred_where_scores_follow_little_of_a_strokes_own_difference(quantity):
+    """Usual values of surfaces at two depths vary more than strokes do, and the other quantity goes with them."""
+    draw = np.random.default_rng(5)
+    usual, other = draw.standard_normal((2, 1, 8))
+    own = draw.standard_normal((2, 30, 8))
+    pool = {"sed": usual + 0.3 * own[0], "shear": 0.95 * usual + 0.31 * other + 0.05 * own[1]}
+    effects = AssumedEffects(70.0, noise=3.0, level_sd=5.0, slope_sd=0.0)
+    weights = [power.study_weights(pool, 12, 4, quantity, effects, draw, 0.2) for _ in range(8)]
+    assert [max(study, key=study.__getitem__) for study in weights] == [quantity] * 8

@@ -238,7 +238,9 @@ def test_akaikes_criterion_is_that_of_the_dense_normal_density_with_two_slopes()
 
     options = {"maxiter": 8000, "maxfev": 8000, "xatol": 1e-7, "fatol": 1e-9, "adaptive": True}
     least = optimize.minimize(dense, np.zeros(6), method="Nelder-Mead", options=options)
-    assert crossed_aic([str(name) for name in who], what, y, x) == pytest.approx(least.fun + 2 * 2, abs=1e-5)
+    assert crossed_aic([str(name) for name in who], what, list(map(str, what)), y, x) == pytest.approx(
+        least.fun + 2 * 2, abs=1e-5
+    )
 
 
 def test_a_slope_that_no_stroke_can_show_is_not_counted():
@@ -249,9 +251,15 @@ def test_a_slope_that_no_stroke_can_show_is_not_counted():
     people = [str(name) for name in who]
     surface = draw.normal(size=5)[what]
     tiny = surface + 1e-6 * draw.normal(size=30)  # its slope within surfaces explains noise alone
-    assert 0.0 <= crossed_aic(people, what, y, surface) + 2.0 - crossed_aic(people, what, y, tiny) < 8.0
+    assert (
+        0.0
+        <= crossed_aic(people, what, list(map(str, what)), y, surface)
+        + 2.0
+        - crossed_aic(people, what, list(map(str, what)), y, tiny)
+        < 8.0
+    )
     shared = 0.3 * (1.0 + draw.normal(size=6)[who])  # the same mean on each surface
-    assert math.isfinite(crossed_aic(people, what, y, shared))
+    assert math.isfinite(crossed_aic(people, what, list(map(str, what)), y, shared))
 
 
 def judged_by_surface(draw, subjects=10):
@@ -287,7 +295,9 @@ def test_round_off_in_the_scores_leaves_akaikes_criterion_as_it_is():
         x = draw.normal(size=5)[what] + 0.05 * draw.normal(size=40)
         y = 20.0 * draw.normal(size=4)[who] + 2.0 * draw.normal(size=5)[what] + 30.0 * x + 5.0 * draw.normal(size=40)
         criteria = [
-            crossed_aic([str(name) for name in who], what, y * (1.0 + 1e-14 * draw.normal(size=40)), x)
+            crossed_aic(
+                [str(name) for name in who], what, list(map(str, what)), y * (1.0 + 1e-14 * draw.normal(size=40)), x
+            )
             for _ in range(4)
         ]
         assert max(criteria) - min(criteria) < 1e-10
@@ -315,7 +325,7 @@ def test_no_spreads_of_a_grid_are_likelier_than_those_of_akaikes_criterion(seed)
 
     grid = np.geomspace(0.02, 20.0, 25)
     least = min(dense(level, surface) for level in (0.0, *grid) for surface in (0.0, *grid))
-    deviance = crossed_aic([str(name) for name in who], what, y, x) - 2 * 2
+    deviance = crossed_aic([str(name) for name in who], what, list(map(str, what)), y, x) - 2 * 2
     assert least - 0.5 < deviance <= least + 1e-9
 
 
@@ -324,7 +334,7 @@ def test_surfaces_that_explain_almost_everything_leave_a_criterion_still():
     who, what = np.repeat(np.arange(10), 5), np.tile(np.arange(5), 10)
     x = draw.normal(size=50)
     y = np.array([16.0, 31.0, 38.0, 100.0, 105.2])[what] + 8.0 * draw.normal(size=10)[who] + 2.0 * draw.normal(size=50)
-    assert math.isfinite(crossed_aic([str(name) for name in who], what, y, x))
+    assert math.isfinite(crossed_aic([str(name) for name in who], what, list(map(str, what)), y, x))
 
 
 def test_a_session_shows_every_rival_beside_the_sed_in_table_picture_data_and_summary():
