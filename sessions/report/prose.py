@@ -171,6 +171,8 @@ def summary(report: Report) -> tuple[str, ...]:
             )
         if experiment.paths:
             sentences.append(paths_sentence(experiment.name, experiment.paths))
+    if any(e.score_relation is not None and e.score_relation.low is not None for e in report.experiments):
+        sentences.append("Intervals of r hold as if the stimuli had been drawn at random.")
     reversals = [
         reversal_sentence(e.descriptor, len(e.falling), len(e.answers)) for e in report.experiments if e.falling
     ]

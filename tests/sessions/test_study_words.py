@@ -110,6 +110,14 @@ def test_two_depths_within_each_session_are_named_too():
     assert "different settings: depth of the model (1.5 mm and 2 mm in each session)." in sentence
 
 
+def test_an_interval_of_r_in_short_comes_with_its_assumption():
+    assumption = "Intervals of r hold as if the stimuli had been drawn at random."
+    assert assumption in prose.summary(example())
+    stickiness, _ = experiments_of(tables(1))
+    none = replace(stickiness.score_relation, low=None, high=None, reason="no interval of r from 3 points")
+    assert assumption not in prose.summary(example(experiments=(replace(stickiness, score_relation=none),)))
+
+
 def test_a_session_of_two_blocks_on_one_descriptor_says_whose_mean_a_score_is():
     stickiness = experiments_of(tables(1))[0]
     twice = (stickiness, replace(stickiness, name="back"))
