@@ -90,6 +90,8 @@ def _relation_sentences(findings: DescriptorFindings, study: StudyFindings) -> l
     name, label = capital(findings.descriptor), BY_NAME[study.response].label
     strain = study.options.prediction.kinematics
     other_strain = "finite" if strain == "small" else "small"
+    if not findings.scores:
+        return [f"{name}: there are no scores to compare the {label} with."]
     if findings.repeated is None:
         trials = Counter(subject for subject, *_ in findings.points)
         if sum(trials.values()) - len(trials) - 1 < 2:

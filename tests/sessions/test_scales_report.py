@@ -102,7 +102,7 @@ def test_the_interval_of_an_exponent_holds_the_true_one_with_and_without_errors_
     ]
     table = SimpleNamespace(descriptor="stickiness", scales=(), consistence={}, exponent=exponent(estimates))
     (sentence,) = scale_sentences(table)
-    interval = r"([\d.]+) \(([\d.]+) to ([\d.]+)\)"
+    interval = r"([\d.]+) \((?:95 % interval )?([\d.]+) to ([\d.]+)\)"
     numbers = re.fullmatch(
         f"Stickiness: if estimates are a power of µ, its exponent by 12 trials of 4 subjects is {interval} with µ "
         "taken as exact, "
@@ -154,8 +154,8 @@ def test_equal_and_just_noticeable_friction_of_one_subject_are_reported_in_ratio
     function = Psychometric(40, PSE, jnd, IntervalEstimate(0.04, None, None), rises=False)
     equal, falling = psychometric_sentences(("friction", {"S1": function}, (None, None)))
     assert equal == (
-        "Friction: by 40 answers the surface felt equal to the standard has 1.25 (1.10 to 1.50) times its µ; the just "
-        f"noticeable difference is {words}, with 4 % lapses."
+        "Friction: by 40 answers the surface felt equal to the standard has 1.25 (95 % interval 1.10 to 1.50) "
+        f"times its µ; the just noticeable difference is {words}, with 4 % lapses."
     )
     assert falling == "Friction: 1 of 1 subject chose the surface of less µ more often."
 
@@ -167,13 +167,13 @@ def test_means_over_subjects_are_geometric_and_stand_in_the_last_row():
     low, middle, high = (math.log(math.log(ratio)) for ratio in (1.1, 1.15, 1.2))
     results = ("friction", {"S1": function, "S2": function, "S3": refusal}, (pse, Average(2, middle, 0.1, low, high)))
     assert psychometric_sentences(results) == [
-        "Friction: over 2 of 3 subjects the surface felt equal to the standard has 1.20 (1.10 to 1.30) times its µ; "
-        "over 2 the just noticeable difference is 15 % of it (10 to 20)."
+        "Friction: over 2 of 3 subjects the surface felt equal to the standard has 1.20 (95 % interval 1.10 to 1.30) "
+        "times its µ; over 2 the just noticeable difference is 15 % of it (10 to 20)."
     ]
     steps = ("friction", dict.fromkeys(("S1", "S2"), function), (replace(pse, n=2), None))
     assert psychometric_sentences(steps)[0].endswith(
-        " 1.20 (1.10 to 1.30) times its µ; every subject's answers step between two comparisons, so no just noticeable "
-        "difference is above 0."
+        " 1.20 (95 % interval 1.10 to 1.30) times its µ; every subject's answers step between two comparisons, "
+        "so no just noticeable difference is above 0."
     )
     some = ("friction", dict.fromkeys(("S1", "S2"), function), (pse, Average(1, middle, None, None, None)))
     assert psychometric_sentences(some)[0].endswith(

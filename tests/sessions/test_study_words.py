@@ -65,6 +65,13 @@ def test_a_session_of_one_reversed_subject_says_so_without_a_count():
     assert "The stickiness scores fall as the index rises; the appendix says more." in alone
 
 
+def test_a_study_without_scores_does_not_count_too_few_of_them():
+    rows = [replace(row, score=None, estimate=3.0 + row.place, outcome="numbered") for row in visit(1).rows]
+    sentences = summary(pool_visits([replace(visit(1), rows=tuple(rows))]))
+    assert "Stickiness: there are no scores to compare the SED with." in sentences
+    assert not [sentence for sentence in sentences if "too few trials" in sentence]
+
+
 def pressed(number, depth, **changes):
     """Return a visit whose model was pressed to a depth."""
     bare = visit(number)

@@ -96,7 +96,9 @@ def scale_sentences(findings: DescriptorFindings) -> list[str]:
     exponent = findings.exponent
     if exponent is not None and exponent.plain is not None:
         plain = exponent.plain
-        estimates = f"{digits(plain.estimate, 2)}{_range((plain.low, plain.high), float, 2)} with µ taken as exact"
+        estimates = (
+            f"{digits(plain.estimate, 2)}{_range((plain.low, plain.high), float, 2, _OF_95)} with µ taken as exact"
+        )
         if exponent.deming is not None:
             value, low, high = exponent.deming
             interval = _range(bounds(low, high), float, 2) or " (no interval: all subjects are alike)"
@@ -148,7 +150,7 @@ def psychometric_sentences(results: PsychometricResults) -> list[str]:
     if len(functions) == 1:
         sentences += [_psychometric_sentence(title, function) for function in functions.values()]
     elif pse is not None:
-        equal = f"{digits(math.exp(pse.mean), 2)}{_range(bounds(pse.low, pse.high), math.exp, 2)}"
+        equal = f"{digits(math.exp(pse.mean), 2)}{_range(bounds(pse.low, pse.high), math.exp, 2, _OF_95)}"
         sentences.append(
             f"{title}: over {pse.n} of {len(functions)} subjects the surface felt equal to the standard has {equal} "
             f"times its µ; {_mean_jnd(jnd, pse.n)}."
@@ -185,13 +187,19 @@ def _psychometric_sentence(title: str, function: Psychometric) -> str:
         jnd = f"{digits(_percent(threshold.value), 0)} % of it{interval}"
     return (
         f"{title}: by {function.answers} answers the surface felt equal to the standard has "
-        f"{digits(math.exp(pse.value), 2)}{_range(pse.ends, math.exp, 2)} times its µ; the just "
+        f"{digits(math.exp(pse.value), 2)}{_range(pse.ends, math.exp, 2, _OF_95)} times its µ; the just "
         f"noticeable difference is {jnd}, with {digits(100.0 * lapse.value, 0)} % lapses."
     )
 
 
-def _range(interval: tuple[float, float] | None, unit: Callable[[float], float], decimals: int) -> str:
-    return "" if interval is None else " ({} to {})".format(*(digits(unit(limit), decimals) for limit in interval))
+_OF_95 = "95 % interval "  # said once in a sentence
+
+
+def _range(interval: tuple[float, float] | None, unit: Callable[[float], float], decimals: int, kind: str = "") -> str:
+    if interval is None:
+        return ""
+    low, high = (digits(unit(limit), decimals) for limit in interval)
+    return f" ({kind}{low} to {high})"
 
 
 def _percent(difference: float) -> float:
