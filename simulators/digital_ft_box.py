@@ -166,7 +166,7 @@ def _crc(frame: bytes) -> bytes:
 SIMULATOR = Simulator(
     "digital-ft",
     serve_on_ports(DigitalFtBox),
-    factor=0.25,
+    factor=0.5,
     statuses=(sum(1 << n for n in (*range(6), 7, *range(8, 14))),),
     unshown=0.2,  # a seven-bit checksum
     at_start=True,
