@@ -81,7 +81,8 @@ def _serve_answer(hostile, listener, answer, *, drip=0.0):
             caller.recv(4096)
             for piece in [answer] if not drip else [answer[i : i + 1] for i in range(len(answer))]:
                 caller.sendall(piece)
-                time.sleep(drip)
+                if hostile._over.wait(drip):
+                    return
 
     hostile.serve(answer_call)
 

@@ -24,6 +24,7 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="there are no pseudo-
 CONNECTS_WITHIN = 10.0
 STOPS_WITHIN = 5.0
 BY_LIBRARY = {"nidaq"}  # its maker's library speaks to the device
+BIAS = "net-ft, a bias on a command port that drips"
 
 
 class FarLink:
@@ -69,28 +70,29 @@ def test_every_driver_with_bytes_of_its_own_has_a_hostile_device():
 
 @pytest.fixture(scope="module")
 def attempts(tmp_path_factory):
-    """Of each hostile device what connecting said and how long it took [s]; all at once, for they mostly wait."""
+    """Of each hostile device what connecting said, its time [s], and what was opened; all at once, for they wait."""
     folder = tmp_path_factory.mktemp("devices")  # its factory is not made for threads
     threads = set(threading.enumerate())
 
     def attempt(name):
-        device, transducers = HOSTILE[name](Path(mkdtemp(dir=folder))), []
+        device = net_ft(STUCK) if name == BIAS else HOSTILE[name](Path(mkdtemp(dir=folder)))
+        uri, transducers = device.uri + "&bias=set" * (name == BIAS), []
         try:
             began = time.monotonic()
-            sentence = connect(device.uri, transducers)
+            sentence = connect(uri, transducers)
             elapsed_s = time.monotonic() - began
         finally:
             for transducer in transducers:
                 transducer.close()
             device.close()
-        return device.uri, sentence, elapsed_s
+        return uri, sentence, elapsed_s, transducers
 
-    return run_in_parallel(attempt, HOSTILE), set(threading.enumerate()) - threads
+    return run_in_parallel(attempt, [*HOSTILE, BIAS]), set(threading.enumerate()) - threads
 
 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_connecting_ends_in_one_sentence_whatever_arrives(name, attempts):
-    uri, sentence, elapsed_s = attempts[0][name]
+    uri, sentence, elapsed_s, _ = attempts[0][name]
     assert elapsed_s < CONNECTS_WITHIN
     assert uri.partition("?")[0].split("://")[0] in sentence or "http" in sentence or "tty" in sentence
     assert "\n" not in sentence
@@ -135,23 +137,13 @@ def test_a_stop_ends_connecting_whatever_arrives(name, stops):
     assert connecting_ended
 
 
-def test_setting_a_bias_ends_on_a_command_port_that_drips():
-    device = net_ft(STUCK)
-    try:
-        began = time.monotonic()
-        sentence = connect(f"{device.uri}&bias=set", [])
-        elapsed_s = time.monotonic() - began
-    finally:
-        device.close()
+def test_setting_a_bias_ends_on_a_command_port_that_drips(attempts):
+    _, sentence, elapsed_s, _ = attempts[0][BIAS]
     assert elapsed_s < CONNECTS_WITHIN
     assert "TCP port" in sentence
 
 
-def test_datagrams_that_are_no_readings_are_named():
-    device, transducers = net_ft(bytes(35)), []
-    try:
-        sentence = connect(device.uri, transducers)
-    finally:
-        device.close()
+def test_datagrams_that_are_no_readings_are_named(attempts):
+    _, sentence, _, transducers = attempts[0]["net-ft, datagrams of 35 bytes"]
     assert "of which none is a reading" in sentence
     assert transducers[0].health.malformed > 0
