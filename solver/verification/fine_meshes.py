@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -19,15 +20,16 @@ from solver.response.solution import solve_many
 from solver.scene import Scene
 from solver.verification.methods import Kinematics
 
-# fineness, shift by half an element, and factor on the usual load steps; the first meshes with a solution are used
-_MESHES: dict[tuple[Kinematics, bool], Sequence[tuple[float, bool, int]]] = {  # by kinematics, `depends_on_way`
-    ("small", False): ((26.0, False, 1), (26.0, True, 1), (23.0, False, 1), (23.0, True, 1), (29.0, False, 1)),
-    ("small", True): ((16.0, False, 12), (16.0, True, 14), (14.0, False, 16), (14.0, True, 13)),
-    ("finite", False): ((15.0, False, 1), (15.0, True, 1), (13.0, False, 1), (13.0, True, 1), (17.0, False, 1)),
-    ("finite", True): ((10.0, False, 4), (10.0, True, 5), (9.0, False, 6), (9.0, True, 4)),
+# Fineness and factor on the usual load steps, by kinematics and `depends_on_way`. Each mesh is also solved shifted by
+# half an element, with the factor increased by 1. The first meshes with a solution are used.
+_MESHES: dict[tuple[Kinematics, bool], Sequence[tuple[float, int]]] = {
+    ("small", False): ((50.0, 1), (44.0, 1), (26.0, 1)),
+    ("small", True): ((24.0, 24), (20.0, 28)),
+    ("finite", False): ((40.0, 1), (34.0, 1), (15.0, 1)),
+    ("finite", True): ((16.0, 8), (14.0, 10)),
 }
 ENOUGH = 2  # number of meshes used
-_REFINED = {"small": 2e-4, "finite": 1e-3}  # tolerance that refines the third mesh
+_REFINED = {"small": 1e-4, "finite": 3e-4}  # tolerance that refines the third mesh
 
 
 def fine_numbers(scenes: Sequence[Scene]) -> Array:
@@ -36,9 +38,10 @@ def fine_numbers(scenes: Sequence[Scene]) -> Array:
     Raises SolveFailure where fewer meshes have a solution.
     """
     solves: list[Array] = []
-    for mesh in _MESHES[scenes[0].solve.kinematics, any(map(depends_on_way, scenes))]:
+    meshes = _MESHES[scenes[0].solve.kinematics, any(map(depends_on_way, scenes))]
+    for (fineness, step_factor), shift in product(meshes, (False, True)):
         with suppress(SolveFailure):
-            solves.append(numbers_on_mesh(scenes, *mesh))
+            solves.append(numbers_on_mesh(scenes, fineness, shift, step_factor + shift))
         if len(solves) == ENOUGH:
             return np.array([*solves, _solve_refined(scenes)])
     raise NotConverged("Fewer than two fine meshes have a state.")
