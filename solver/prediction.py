@@ -75,9 +75,9 @@ class NestedNumbers:
     """The `all_numbers` of a scene on the nested mesh, which divides every element into four; SED first."""
 
     numbers: Array  # (COUNT,)
-    edge_changes: Array  # (m, COUNT) their changes as each of m edges of contact moves by a node of that mesh
+    edge_errors: Array  # (2, m, COUNT) bounds of the parts of errors that m edges of contact add, as `half_width` takes
     row: Array  # (r,) SED of the row of receptors [MPa]
-    row_edge_changes: Array  # (m, r) changes of `row` as each edge moves
+    row_edge_errors: Array  # (2, m, r) such bounds for `row`
     order: float  # order of convergence that the error estimates assume
     shares: Array | None = None  # (a + b,) of each column and row of the mesh in the SED's error, where it is too large
 

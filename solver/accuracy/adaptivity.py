@@ -21,7 +21,7 @@ import numpy as np
 
 from solver._kernels import OPEN, SLIP, STICK
 from solver.accuracy.convergence_order import richardson_factor
-from solver.accuracy.error_estimate import NO_NESTED_STATE, PARTS, Steps, edge_share, errors
+from solver.accuracy.error_estimate import NO_NESTED_STATE, PARTS, WIDTH, Steps, edge_errors, errors
 from solver.arrays import Array, Indices
 from solver.body import Patches
 from solver.body.linear import Elastic
@@ -126,40 +126,50 @@ def adjoint(finger: LinearFinger, displacement: Array, state: EquilibriumState) 
     return recover((free + compliance[:, forces] @ reactions).reshape(-1, 2))
 
 
+FingerState = tuple[Finger[Any], EquilibriumState]
+
+
 def nested_numbers(
     scene: Scene,
     numbers: Array,
-    finger: Finger[Any],
-    state: EquilibriumState,
+    answer: FingerState,
+    nested: FingerState,
     values: Array,
-    changes: Array,
+    changes: tuple[Array, Array],
     steps: Steps | None,
     order: float,
 ) -> NestedNumbers | NotConverged:
     """Return the results of a nested state, with the shares of columns and rows where a finer mesh may be needed.
 
-    `numbers` (COUNT,) are the scene's results on the mesh of the answer. `values` (COUNT + r,) and `changes` (m, COUNT
-    + r) come from `edge_changes` at the `state` of the nested `finger`. `steps` are its load steps where it depends on
-    its load path, and `order` is its `order_of`. Returns NO_NESTED_STATE where no equilibrium exists with an edge
-    moved, as at a friction limit.
+    `numbers` (COUNT,) are the scene's results in the `answer`. `values` (COUNT + r,) are the `numbers_and_row` of the
+    `nested` state, and `changes` (m, COUNT + r) come from `edge_changes` in both. `steps` are the load steps where the
+    state depends on its load path, and `order` is its `order_of`. Returns NO_NESTED_STATE where no equilibrium exists
+    with an edge moved, as at a friction limit.
     """
-    if np.isinf(changes).any():
+    edges = edge_errors(*changes, order, linear=[WIDTH])
+    if np.isinf(edges).any():
         return NO_NESTED_STATE
     results = values[:COUNT] if steps is None else steps.extrapolate(values[:COUNT])
-    nested = NestedNumbers(results, changes[:, :COUNT], values[COUNT:], changes[:, COUNT:], order)
+    found = NestedNumbers(results, edges[..., :COUNT], values[COUNT:], edges[..., COUNT:], order)
     target = scene.solve.target
-    misses_tolerance = target is not None and errors(scene, numbers, nested, steps).error_estimate > target
+    misses_tolerance = target is not None and errors(scene, numbers, found, steps).error_estimate > target
     if not misses_tolerance and scene.solve.contrast_tolerance is None:
-        return nested
+        return found
+    finger, state = nested
     parts = np.concatenate(_grid(finger).parts(finger.displacement(state), state))
-    change = abs(float(nested.numbers[0] - numbers[0]))
-    parts *= richardson_factor(nested.order) * change / max(float(parts.sum()), np.finfo(float).tiny)
+    change = abs(float(found.numbers[0] - numbers[0]))
+    parts *= richardson_factor(order) * change / max(float(parts.sum()), np.finfo(float).tiny)
+    columns = np.concatenate([_columns_of_edges(*state) for state in (answer, nested)])
+    np.add.at(parts, columns, edges[edges[..., 0].sum(axis=1).argmax(), :, 0])
+    whole = float(parts.sum())
+    return replace(found, shares=parts / whole if whole > 0.0 else None)
+
+
+def _columns_of_edges(finger: Finger[Any], state: EquilibriumState) -> Indices:
+    """Return the columns (m,) of the answer's mesh that hold the edges of contact of a state on it or nested in it."""
     edge = np.flatnonzero(np.diff(state.state))  # node before each edge of contact
     middle = (finger.geometry.skin_arcs[edge] + finger.geometry.skin_arcs[edge + 1]) / 2.0
-    columns = np.searchsorted(finger.geometry.lines.arcs, middle) - 1
-    np.add.at(parts, columns, edge_share(nested.order) * nested.edge_changes[:, 0])
-    whole = float(parts.sum())
-    return replace(nested, shares=parts / whole if whole > 0.0 else None)
+    return np.searchsorted(finger.geometry.lines.arcs, middle) - 1
 
 
 @lru_cache(maxsize=1)

@@ -7,9 +7,9 @@ tissue, errors may fall only with the first power, and the error is at most 1 + 
 error on h is the series without its first term.
 
 Two meshes may agree by chance on where contact states change: an edge of contact, of stick or of slip at the bound lies
-anywhere between two nodes. Each edge is moved by one node of h to either side at otherwise fixed contact states, and
-the linearised body is solved again. A result is a parabola of an edge's position about the true one, so that a share of
-the larger change counts: a third at second order, all of it at first. The sum over the edges bounds their part.
+anywhere between two nodes. On H and on h, each edge is moved by one node to either side at otherwise fixed contact
+states, and the linearised body is solved again. A result is a parabola of an edge's position about the true one, so
+that a share of the larger change bounds the error by this edge (`edge_errors`).
 
 Much of the error is common to all surfaces of one finger and cancels in their differences. The rest is estimated in the
 same way for the worst pair of surfaces. Only the edges differ: those of two surfaces err independently, so that their
@@ -35,38 +35,38 @@ from solver.quantities import NAMES
 from solver.scene import Scene
 from solver.scene.tables import USUAL_TOLERANCE
 
-SHIFT, _WIDTH = 4, 5  # indices of the bone's shift and of the contact's width in `all_numbers`
+SHIFT, WIDTH = 4, 5  # indices of the bone's shift and of the contact's width in `all_numbers`
 
 
-def half_width(change: Array, edges: Array, order: float = ORDER, share: Array | None = None) -> Array:
-    """Return the error estimate of results (...) from their `change` to the nested mesh.
+def half_width(change: Array, edges: Array, order: float = ORDER) -> Array:
+    """Return the error estimate of results (...) from their `change` to the nested mesh and `edge_errors` (2, m, ...).
 
-    `edges` (m, ...) are their changes on the nested mesh as each edge of contact moves. A `share` of these counts, by
-    default `edge_share`. Errors fall with the power `order` of the element size.
+    Errors fall with the power `order` of the element size.
     """
-    return richardson_factor(order) * np.abs(change) + (edge_share(order) if share is None else share) * edges.sum(
-        axis=0
-    )
+    return richardson_factor(order) * np.abs(change) + edges.sum(axis=1).max(axis=0)
 
 
-def edge_share(order: float) -> float:
-    """Return the counted share of a result's change when an edge of contact moves by one node of the nested mesh.
+def edge_errors(
+    on_mesh: Array, on_nested: Array, order: float = ORDER, linear: Sequence[int] | slice = slice(0)
+) -> Array:
+    """Return bounds (2, m + k, n) of the parts of n errors that m edges of contact add on H, and k edges on h.
 
-    The result is a parabola of the edge's position about the true one, which is at most one such node away on the mesh
-    and half a node on the nested one. So the errors E_H and E_h lie between 0 and the change c, and between 0 and c/4.
-    They add r E_h + (1 - r) E_H to the extrapolated error, r being `richardson_factor`.
+    `on_mesh` (m, n) and `on_nested` (k, n) are the results' changes as each edge moves by a node of its mesh. A result
+    is a parabola of the edge's position about the true one, which is at most half a node away. So the error by an edge
+    lies between 0 and a quarter of the change. The errors E_H and E_h have one sign and add r E_h - (r - 1) E_H to the
+    extrapolated error, r being `richardson_factor`. So the larger of both terms counts, of the sums over the second
+    axis. The results `linear` are linear in the position, to either side of the true one. Then errors are at most half
+    the change, and both terms add.
 
-    >>> round(edge_share(2.0), 4), edge_share(1.0)
-    (0.3333, 1.0)
+    >>> edge_errors(np.array([[0.12]]), np.array([[0.03]])).sum(axis=1).max(axis=0).round(9)
+    array([0.01])
     """
     factor = richardson_factor(order)
-    return max(factor / 4.0, factor - 1.0)
-
-
-def _edge_shares(order: float) -> Array:
-    """Return the shares (COUNT,); the contact's width is linear in its edges, to either side of its true value."""
-    factor = richardson_factor(order)
-    return np.where(np.arange(COUNT) == _WIDTH, factor / 2.0 + factor - 1.0, edge_share(order))
+    on_mesh, on_nested = (factor - 1.0) / 4.0 * on_mesh, factor / 4.0 * on_nested
+    out = np.zeros((2, len(on_mesh) + len(on_nested), on_mesh.shape[1]))
+    out[0, : len(on_mesh)], out[1, len(on_mesh) :] = on_mesh, on_nested
+    out[:, :, linear] = 2.0 * out[:, :, linear].sum(axis=0)
+    return out
 
 
 PARTS = np.array([0.48, 0.68])  # of the usual steps: 12 and 17 of 25, about a half and two thirds
@@ -128,6 +128,17 @@ class Errors(NamedTuple):
 
 
 def edge_changes(
+    newton: Newton,
+    state: EquilibriumState,
+    forces: ForceLoad | None,
+    numbers: Callable[[Sequence[EquilibriumState]], Array],
+) -> tuple[Array, Array]:
+    """Return the results (n,) of one state and their changes (m, n), as `edge_changes_of_all`."""
+    (values,), (changes,) = edge_changes_of_all(newton, [(state, forces)], numbers)
+    return values, changes
+
+
+def edge_changes_of_all(
     newton: Newton,
     states: Sequence[tuple[EquilibriumState, ForceLoad | None]],
     numbers: Callable[[Sequence[EquilibriumState]], Array],
@@ -205,7 +216,7 @@ def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: St
         error, relative, corrected = np.full(COUNT, np.nan), np.ones(COUNT), 1.0
     else:
         change = nested.numbers - numbers
-        error = half_width(change, nested.edge_changes, nested.order, _edge_shares(nested.order))
+        error = half_width(change, nested.edge_errors, nested.order)
         if steps is not None:
             error += steps.error
         relative = error / np.maximum(np.abs(numbers), np.finfo(float).tiny)
@@ -230,7 +241,7 @@ def row_errors(row: Array, nested: NestedNumbers | None) -> Array:
     """Return the relative errors (r,) of the SED of a row of receptors `row` (r,); nan where unknown."""
     if nested is None:
         return np.full(len(row), np.nan)
-    error = half_width(nested.row - row, nested.row_edge_changes, nested.order)
+    error = half_width(nested.row - row, nested.row_edge_errors, nested.order)
     return error / np.maximum(row, np.finfo(float).tiny)
 
 
@@ -272,11 +283,11 @@ def contrast_error(predictions: Sequence[Prediction]) -> ContrastError:
     count = len(COMPARED)
     numbers = np.abs([(o.sed_ending, o.normal_force, o.tangential_force, o.indentation) for o, _ in with_estimate])
     change = np.abs([nested.numbers[:count] for _, nested in with_estimate]) - numbers
-    edges = np.array([np.linalg.norm(nested.edge_changes[:, :count], axis=0) for _, nested in with_estimate])
+    edges = np.stack([np.linalg.norm(nested.edge_errors[..., :count], axis=1) for _, nested in with_estimate], axis=1)
     pairs = np.array(list(combinations(range(len(with_estimate)), 2))).T
     apart = change[pairs[0]] - change[pairs[1]]
     order = min(nested.order for _, nested in with_estimate)
-    worst = half_width(apart, np.hypot(edges[pairs[0]], edges[pairs[1]])[None], order)
+    worst = half_width(apart, np.hypot(edges[:, pairs[0]], edges[:, pairs[1]])[:, None], order)
     off_by, mean = worst.max(axis=0), numbers.mean(axis=0)
     shares = off_by / np.maximum(
         np.maximum(np.ptp(numbers, axis=0), LEAST_RANGE * mean / WARNING_SHARE), np.finfo(float).tiny
@@ -316,14 +327,11 @@ def estimate_errors(
     the state is the end of a load path on which skin sticks, `fewer` are its ends on the same mesh after `PARTS` of
     the load steps. Errors are infinite where contact with a moved edge has no equilibrium.
     """
-    value = numbers(newton, state)
-    nested_newton, nested_equilibrium = nested
-    (corrected,), (edges,) = edge_changes(
-        nested_newton,
-        [(nested_equilibrium, forces)],
-        lambda states: np.array([numbers(nested_newton, state) for state in states]),
+    (value, on_mesh), (corrected, on_nested) = (
+        edge_changes(body, found, forces, lambda states, body=body: np.array([numbers(body, s) for s in states]))
+        for body, found in ((newton, state), nested)
     )
-    error = half_width(corrected - value, edges)
+    error = half_width(corrected - value, edge_errors(on_mesh, on_nested))
     if fewer:
         if len(fewer) != len(PARTS):
             raise ValueError(f"fewer has {len(fewer)} states; give one after each of {PARTS.tolist()} of the steps")

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from time import perf_counter
 
+import numpy as np
+
 from solver.accuracy import audits
 from solver.accuracy.adaptivity import choose_steps, nested_numbers, steps_of_press
 from solver.accuracy.convergence_order import order_of
@@ -21,7 +23,7 @@ from solver.equilibrium.relaxation import CondensedRelaxing
 from solver.failures import WRINKLES, Folds, NoSteadyState, NotConverged, SolveFailure
 from solver.mesh import Fineness, Lines
 from solver.mesh.mesher import Sizing
-from solver.prediction import NestedNumbers, Prediction
+from solver.prediction import COUNT, NestedNumbers, Prediction
 from solver.progress import check_stop, report_progress
 from solver.response import (
     FIRST_FINENESS,
@@ -187,12 +189,19 @@ def solution_on(
 
 
 def solve_nested(
-    scene: Scene, top: MeshSolution, numbers: Array, steps: Steps | None, meshes: Meshes
+    scene: Scene,
+    top: MeshSolution,
+    last: EquilibriumState,
+    numbers: Array,
+    changes: Array,
+    steps: Steps | None,
+    meshes: Meshes,
 ) -> tuple[NestedNumbers | NotConverged, Steps | None]:
     """Return the results of a scene on the nested mesh of `top`, or the reason for no estimate, and its load steps.
 
-    `numbers` (COUNT,) are the results on the mesh of `top`, and `steps` the load steps taken where the state depends on
-    its load path. Raises Cancelled.
+    `last` is the scene's state on the mesh of `top`, `numbers` (COUNT,) are its results, and `changes` (m, COUNT + r)
+    come from `edge_changes` there. `steps` are the load steps taken where the state depends on its load path. Raises
+    Cancelled.
     """
     if not top.finger.newton.is_stable(top.state):
         return Folds(WRINKLES), steps
@@ -213,8 +222,9 @@ def solve_nested(
     except SolveFailure:
         return NO_NESTED_STATE, steps
     forces = None if scene.viscoelastic else forces_of(scene, state.load)
-    (values,), (changes,) = edge_changes(finger.newton, [(state, forces)], finger.numbers_and_row)
-    return nested_numbers(scene, numbers, finger, state, values, changes, steps, order), steps
+    values, nested_changes = edge_changes(finger.newton, state, forces, finger.numbers_and_row)
+    both = changes, nested_changes
+    return nested_numbers(scene, numbers, (top.finger, last), (finger, state), values, both, steps, order), steps
 
 
 FINITE_IMBALANCE = 1e-8  # relative residual of the forces from which a state is corrected further [-]
@@ -281,11 +291,12 @@ def _predict(scene: Scene, fineness: Fineness, coarse: MeshSolution, meshes: Mes
     state, checks = audits.balance(state, checks, FINITE_IMBALANCE, correct)
     solution = SceneSolution(scene, state, state.u, checks, steps, path)
     complete_audits(finger, solution, newton, lambda: finger.sed_ending(top.state.u))
-    numbers = finger.all_numbers([state])[0]
     solved_at = perf_counter()
     report_progress("estimating errors, on the nested mesh")
-    on_nested, steps = solve_nested(scene, top, numbers, steps, meshes)
-    row = finger.row.average(state.u)
+    forces = None if scene.viscoelastic else forces_of(scene, state.load)
+    values, changes = edge_changes(finger.newton, state, forces, finger.numbers_and_row)
+    numbers, row = np.split(values, [COUNT])
+    on_nested, steps = solve_nested(scene, top, state, numbers, changes, steps, meshes)
     estimate_s = perf_counter() - solved_at
     wall = solved_at - start - setup
     solution = replace(solution, steps=steps, warnings=limit_warnings(finger, state), wall_s=wall, setup_s=setup)

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from solver.accuracy.adaptivity import FingerState
 from solver.accuracy.convergence_order import order_of
-from solver.accuracy.error_estimate import PARTS, edge_changes, half_width
+from solver.accuracy.error_estimate import PARTS, WIDTH, edge_changes, edge_errors, half_width
 from solver.arrays import Array
 from solver.contact import ForceLoad
 from solver.equilibrium import EquilibriumState
@@ -99,37 +100,44 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
     def march_on(finger: Finger[Any], part: float) -> LoadPath:
         return march_scene(scene, finger, part, relaxing=scene.materials.relax)
 
+    def states_at(path: LoadPath, course: History) -> list[EquilibriumState]:
+        return [path.instants[end - 1 - len(course.time)].state for end in instants(course)]
+
     try:
-        fewer = [course_numbers(history(scene, mesh, march_on(mesh, part))) for part in PARTS.tolist()]
+        paths = [march_on(mesh, part) for part in PARTS.tolist()]
+        courses = [history(scene, mesh, path) for path in paths]
         path = march_on(nested, float(PARTS[0]))
         course = history(scene, nested, path)
-        ends = instants(course)
-        states = [path.instants[end - 1 - len(course.time)].state for end in ends]
-        order = min(order_of(nested, state) for state in states)
+        order = min(order_of(nested, state) for state in states_at(path, course))
     except SolveFailure:
         return CourseNumbers(usual.value * np.nan, usual.rate * np.nan)
-    finer = course_numbers(course)
-    edges = 0.0 * usual.value
+    finer, fewer = course_numbers(course), [course_numbers(numbers) for numbers in courses]
+    edges = np.zeros((2, *usual.value.shape))
     if not scene.materials.relax:
-        edges += [_sum_of_edge_changes(scene, nested, state) for state in states]
-    times = np.concatenate([[0.0], course.time])[[0, *ends]]
-    of_quantities = np.concatenate([np.zeros((1, len(NAMES))), edges[:, len(COURSE_NUMBERS) :]])
+        at_ends = zip(states_at(paths[0], courses[0]), states_at(path, course), strict=True)
+        edges += np.stack([_edge_errors(scene, (mesh, a), (nested, b), order) for a, b in at_ends], axis=1)
+    times = np.concatenate([[0.0], course.time])[[0, *instants(course)]]
+    of_quantities = np.pad(edges[:, :, len(COURSE_NUMBERS) :], ((0, 0), (1, 0), (0, 0)))
     with np.errstate(divide="ignore", invalid="ignore"):  # of a missing part
-        rate_edges = (of_quantities[1:] + of_quantities[:-1]) / np.diff(times)[:, None]
+        rate_edges = (of_quantities[:, 1:] + of_quantities[:, :-1]) / np.diff(times)[:, None]
 
-    def error(name: str, changed_by_edges: Array) -> Array:
+    def error(name: str, by_edges: Array) -> Array:
         value, nested_value, *by_part = (getattr(numbers, name) for numbers in (usual, finer, *fewer))
         by_steps = sum(
             abs(number - value) / (1.0 / part - 1.0) for number, part in zip(by_part, PARTS.tolist(), strict=True)
         )
-        return half_width(nested_value - by_part[0], changed_by_edges[None], order) + by_steps
+        return half_width(nested_value - by_part[0], by_edges[:, None], order) + by_steps
 
     return CourseNumbers(error("value", edges), error("rate", rate_edges))
 
 
-def _sum_of_edge_changes(scene: Scene, nested: Finger[Any], state: EquilibriumState) -> Array:
-    """Return the changes of the results at an instant (5 + q,), summed over edges of contact that move by a node."""
-    by_force = scene.normal_force is not None
-    forces = ForceLoad(float(state.normal.sum()), None, state.load.travel) if by_force else None
-    changes = edge_changes(nested.newton, [(state, forces)], nested.all_numbers)[1][0].sum(axis=0)
-    return np.concatenate([changes[_PLACES], changes[len(_PLACES) + 2 :]])
+def _edge_errors(scene: Scene, answer: FingerState, nested: FingerState, order: float) -> Array:
+    """Return the `edge_errors` (2, 5 + q) of the results at an instant, summed over edges of contact."""
+
+    def changes(finger: Finger[Any], state: EquilibriumState) -> Array:
+        by_force = scene.normal_force is not None
+        forces = ForceLoad(float(state.normal.sum()), None, state.load.travel) if by_force else None
+        return edge_changes(finger.newton, state, forces, finger.all_numbers)[1]
+
+    sums = edge_errors(changes(*answer), changes(*nested), order, linear=[WIDTH]).sum(axis=1)
+    return np.concatenate([sums[:, _PLACES], sums[:, len(_PLACES) + 2 :]], axis=1)

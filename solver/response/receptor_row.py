@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from solver.accuracy.adaptivity import FingerState
 from solver.accuracy.convergence_order import order_of
-from solver.accuracy.error_estimate import PARTS, Steps, edge_changes, half_width
+from solver.accuracy.error_estimate import PARTS, Steps, edge_changes, edge_errors, half_width
 from solver.arrays import Array
 from solver.body import Patches
 from solver.body.finite import FiniteBody, FinitePatches
@@ -65,33 +66,39 @@ def row_along(prediction: Prediction, arcs: Array = ROW, receptor: Receptor | No
 
 def _row_errors(prediction: Prediction, values: Array, arcs: Array, receptor: Receptor) -> Array:
     """Return the errors of a row (q, r). Raises SolveFailure where the nested mesh has no such state."""
-    scene, sizing = prediction.scene, replace(prediction.geometry.sizing, halved=True)
+    scene = prediction.scene
 
     def row_numbers(finger: Finger[Any]) -> Callable[[Sequence[EquilibriumState]], Array]:
         row = finger.patches(endings(finger.geometry, finger.body.centre, receptor, arcs))
         return lambda states: np.moveaxis(row.responses(finger.recover(states, row)), -1, 0).reshape(len(states), -1)
 
-    nested, state, coarse = _solve_nested(prediction, sizing)
-    in_steps = state.load.path_dependent
+    answer, nested, coarse = _solve_again(prediction)
+    in_steps = nested[1].load.path_dependent
     if in_steps:
-        state = end_of_path(scene, nested)
-    (finer,), (edges,) = edge_changes(nested.newton, [(state, forces_of(scene, state.load))], row_numbers(nested))
-    errors = half_width(finer - values.ravel(), edges, order_of(nested, state))
+        answer, nested = ((finger, end_of_path(scene, finger)) for finger, _ in (answer, nested))
+    order = order_of(*nested)
+    (_, on_mesh), (finer, on_nested) = (
+        edge_changes(finger.newton, state, forces_of(scene, state.load), row_numbers(finger))
+        for finger, state in (answer, nested)
+    )
+    errors = half_width(finer - values.ravel(), edge_errors(on_mesh, on_nested, order), order)
     if in_steps:
         usual, *fewer = row_numbers(coarse)([end_of_path(scene, coarse, times) for times in (1.0, *PARTS.tolist())])
         errors += Steps.of(usual, np.array(fewer), scene.solve.target).bound
     return errors.reshape(values.shape)
 
 
-def _solve_nested(prediction: Prediction, sizing: Sizing) -> tuple[Finger[Any], EquilibriumState, Finger[Any]]:
-    """Return the nested finger, its state, and the finger on which load paths in fewer steps are judged."""
-    scene, meshes = prediction.scene, Meshes()
+def _solve_again(prediction: Prediction) -> tuple[FingerState, FingerState, Finger[Any]]:
+    """Return the state, that on the nested mesh, and the finger on which load paths in fewer steps are judged."""
+    scene, sizing, meshes = prediction.scene, prediction.geometry.sizing, Meshes()
+    halved = replace(sizing, halved=True)
     if scene.solve.kinematics == "small":
-        finger = LinearFinger.of(scene, sizing)
-        return finger, nearest_state(scene, finger), LinearFinger.on(scene, prediction.geometry)
+        finger, nested = LinearFinger.on(scene, prediction.geometry), LinearFinger.of(scene, halved)
+        return (finger, nearest_state(scene, finger)), (nested, nearest_state(scene, nested)), finger
     low = coarse_solution(scene, expected_depth(scene), sizing.fineness, meshes)
     top = solution_on(scene, sizing, low, meshes)
-    return top.finger, top.state, low.finger
+    fine = solution_on(scene, halved, top, meshes)
+    return (top.finger, top.state), (fine.finger, fine.state), low.finger
 
 
 def _row_patches(prediction: Prediction, arcs: Array, receptor: Receptor) -> Patches:

@@ -5,6 +5,7 @@ where tissues relax (`solver.equilibrium.relaxation`).
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from time import perf_counter
 
@@ -13,7 +14,7 @@ import numpy as np
 from solver.accuracy import audits
 from solver.accuracy.adaptivity import choose_steps, nested_numbers, steps_of_press
 from solver.accuracy.convergence_order import order_of
-from solver.accuracy.error_estimate import NO_NESTED_STATE, Steps, edge_changes
+from solver.accuracy.error_estimate import NO_NESTED_STATE, Steps, edge_changes_of_all
 from solver.arrays import Array
 from solver.continuation.small_states import (
     WIDE_MARGIN,
@@ -153,13 +154,15 @@ class SmallMeshing(Meshing):
     def _predict(self, solutions: list[SceneSolution], finger: LinearFinger, sizing: Sizing) -> list[Prediction]:
         """Return the prediction of each state with its error estimate; all results are computed together."""
         start = perf_counter()
-        numbers = finger.all_numbers([solution.state for solution in solutions])
+        states = [(solution.state, forces_of(solution.scene, solution.state.load)) for solution in solutions]
+        values, changes = edge_changes_of_all(finger.newton, states, finger.numbers_and_row)
+        numbers = values[:, :COUNT]
         displacements = np.stack([solution.displacement for solution in solutions], axis=2)
         numbers[:, FORCES_AND_PLACES:] = finger.ending.responses(displacements)[:, 0].T
         numbers[:, 0] = numbers[:, FORCES_AND_PLACES]
         rows = finger.row.average(displacements)
         mesh, _ = self._finger(replace(sizing, halved=True))
-        nested = nested_numbers_of_all(mesh, solutions, numbers)
+        nested = _nested_numbers_of_all(finger, mesh, solutions, numbers, changes)
         estimate_s = (perf_counter() - start) / len(solutions)
         return [
             prediction(solution, finger, numbers[number], rows[:, number], nested[number], estimate_s)
@@ -187,29 +190,32 @@ def _remove_round_off(
     return first if scene.viscoelastic else audits.balance(*first, SMALL_IMBALANCE, correct)
 
 
-def nested_numbers_of_all(
-    mesh: LinearFinger, solutions: Sequence[SceneSolution], numbers: Array
+def _nested_numbers_of_all(
+    finger: LinearFinger,
+    mesh: LinearFinger,
+    solutions: Sequence[SceneSolution],
+    numbers: Array,
+    changes: Sequence[Array],
 ) -> list[NestedNumbers | NotConverged]:
-    """Return the results of solved scenes on the nested `mesh`, or the failure of a scene there.
+    """Return the results of scenes solved on `finger` on its nested `mesh`, or the failure of a scene there.
 
-    `numbers` (c, COUNT) are the results on the mesh of the answers.
+    `numbers` (c, COUNT) are the results on the finger, `changes` (m, COUNT + r) of each those by moved edges there.
     """
     states: dict[int, EquilibriumState] = {}
     for number, solution in enumerate(solutions):
-        try:
+        with suppress(SolveFailure):
             states[number] = (
                 nearest_state(solution.scene, mesh) if solution.steps is None else end_of_path(solution.scene, mesh)
             )
-        except SolveFailure:
-            continue
     out: list[NestedNumbers | NotConverged] = [NO_NESTED_STATE] * len(solutions)
     if states:
         with_forces = [(state, forces_of(solutions[number].scene, state.load)) for number, state in states.items()]
-        values, changes = edge_changes(mesh.newton, with_forces, mesh.numbers_and_row)
-        for (number, state), value, change in zip(states.items(), values, changes, strict=True):
-            solution = solutions[number]
+        values, nested_changes = edge_changes_of_all(mesh.newton, with_forces, mesh.numbers_and_row)
+        for (number, state), value, nested_change in zip(states.items(), values, nested_changes, strict=True):
+            solution, both = solutions[number], (changes[number], nested_change)
+            answer, nested = (finger, solution.state), (mesh, state)
             order = order_of(mesh, state)
             out[number] = nested_numbers(
-                solution.scene, numbers[number], mesh, state, value, change, solution.steps, order
+                solution.scene, numbers[number], answer, nested, value, both, solution.steps, order
             )
     return out

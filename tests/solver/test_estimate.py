@@ -7,7 +7,7 @@ import pytest
 
 from solver import Finger, Friction, Loading, Material, Materials, Receptor, Relaxation, Scene, Solve, solve
 from solver.accuracy.convergence_order import trial_warnings
-from solver.accuracy.error_estimate import errors, half_width
+from solver.accuracy.error_estimate import WIDTH, edge_errors, errors, half_width
 from solver.continuation.small_states import expected_depth, nearest_state, settled_state
 from solver.equilibrium import EQUILIBRIUM
 from solver.equilibrium.finger import LinearFinger
@@ -81,19 +81,21 @@ def test_the_tolerance_is_met_with_no_more_work_than_it_needs(tolerance):
     assert prediction.dofs < {0.01: 2500, 0.003: 8000, 0.001: 30000}[tolerance]
 
 
-def test_an_error_that_falls_with_the_square_of_an_element_is_known_and_edges_add_a_third_of_what_a_node_changes():
+def test_an_error_that_falls_with_the_square_of_an_element_is_known_and_edges_add_a_share_of_what_a_node_changes():
     sliding = Scene(friction=Friction(0.3), loading=Loading(1.0))
     truth, error = np.ones(COUNT), 0.04
-    zeros, edges = np.zeros((1, COUNT)), np.full((2, COUNT), 0.005)
+    zeros = np.zeros((2, 1, COUNT))
+    edges = edge_errors(np.full((2, COUNT), 0.012), np.full((2, COUNT), 0.005), linear=[WIDTH])
     nested = NestedNumbers(truth * (1.0 + error / 4.0), zeros, zeros, zeros, 2.0)
     estimate = errors(sliding, truth * (1.0 + error), nested, None)
     assert estimate.error_estimate == pytest.approx(error / (1.0 + error), rel=1e-12)
     assert estimate.corrected_error == pytest.approx(error / 4.0 / (1.0 + error / 4.0), rel=1e-12)
-    with_edges = errors(sliding, truth * (1.0 + error), replace(nested, edge_changes=edges), None)
+    with_edges = errors(sliding, truth * (1.0 + error), replace(nested, edge_errors=edges), None)
     assert with_edges.error_estimate - estimate.error_estimate == pytest.approx(0.01 / 3.0 / 1.04, rel=1e-12)
     assert with_edges.corrected_error - estimate.corrected_error == pytest.approx(0.01 / 3.0 / 1.01, rel=1e-12)
     widths = with_edges.contact_width_error, estimate.contact_width_error
-    assert widths[0] - widths[1] == pytest.approx(0.01 / 1.04, rel=1e-12)  # it follows an edge by a line
+    by_both = 2.0 * (0.01 / 3.0 + 0.024 / 12.0)  # it follows an edge by a line
+    assert widths[0] - widths[1] == pytest.approx(by_both / 1.04, rel=1e-12)
     for name, response in estimate.responses.items():
         assert with_edges.responses[name].error - response.error == pytest.approx(0.01 / 3.0, rel=1e-12)
 
@@ -102,13 +104,11 @@ def test_an_error_that_falls_with_the_square_of_an_element_is_known_and_edges_ad
 def test_errors_of_any_order_and_edges_at_any_place_lie_below_the_estimate_and_some_come_near(order):
     rng, largest = np.random.default_rng(5), 0.0
     for _ in range(20000):
-        series, edge = rng.normal(), rng.exponential()  # error on the mesh but for edges; change as one moves by a node
-        on_mesh, on_nested = (
-            edge * rng.uniform() ** 2,
-            edge * (rng.uniform() / 2.0) ** 2,
-        )  # a node away, half a node away
+        series, changes = rng.normal(), rng.exponential(size=2)  # error but for an edge; changes as it moves by a node
+        on_mesh, on_nested = changes * (rng.uniform(size=2) / 2.0) ** 2  # from an edge up to half a node away
         value, nested = series + on_mesh, series / 2.0**order + on_nested
-        bound = half_width(np.array(nested - value), np.array([edge]), order)
+        edges = edge_errors(*changes[:, None, None], order)
+        bound = half_width(np.array([nested - value]), edges, order)[0]
         largest = max(largest, abs(value) / bound, abs(nested) / (bound - abs(nested - value)))
     assert 0.9 < largest <= 1.0 + 1e-12
 
@@ -174,8 +174,18 @@ def test_the_nested_value_is_nearer_the_truth_than_the_meshs_own(kinematics):
     assert max(ratios) < 1.0
 
 
-@pytest.mark.parametrize("tolerance", [pytest.param(0.01, marks=pytest.mark.slow), None])
-@pytest.mark.parametrize("case", DECEIVING, ids=["layers", "bound"])
+CANCELS = pytest.mark.xfail(strict=True, reason="errors by columns and by rows cancel in the change, as the docs say")
+
+
+@pytest.mark.parametrize(
+    ("case", "tolerance"),
+    [
+        pytest.param(DECEIVING[0], None, id="layers"),
+        pytest.param(DECEIVING[0], 0.01, id="layers, 1 %", marks=pytest.mark.slow),
+        pytest.param(DECEIVING[1], None, id="bound", marks=CANCELS),
+        pytest.param(DECEIVING[1], 0.01, id="bound, 1 %", marks=pytest.mark.slow),
+    ],
+)
 def test_at_finite_strain_estimates_see_layers_in_the_fat_and_the_bound_at_the_edges_of_contact(case, tolerance):
     *numbers, truth = case
     prediction = solve(scene_of(*numbers, Solve("finite", tolerance=tolerance)))
