@@ -78,8 +78,6 @@ os.environ["NUMBA_CACHE_DIR"] = str(_cache_folder())  # numba reads it once, at 
 os.environ.setdefault("NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1")  # numba colours even errors that it handles
 _numba: Any = import_module("numba")
 _caching: Any = import_module("numba.core.caching")
-_codegen: Any = import_module("numba.core.codegen")
-_compiler: Any = import_module("numba.core.compiler")
 events: Any = import_module("numba.core.event")
 
 
@@ -110,48 +108,6 @@ def _alone(folder: Path) -> Generator[None]:
         yield
 
 
-class _Flags(_compiler.Flags):
-    """Numba's options of a loop, compared by those that are set.
-
-    Numba compares them at each call whose types it infers. Its own comparison computes all of
-    them, a twentieth of the time to compile.
-    """
-
-    def __hash__(self) -> int:
-        return 0
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Flags) and self._values == other._values
-
-
-class _LoopCompiler(_compiler.Compiler):
-    def _compile_bytecode(self) -> Any:  # noqa: ANN401 - numba declares no types
-        self.state.flags = _Flags(self.state.flags)
-        return super()._compile_bytecode()
-
-
-class _InlinedCode(_codegen.JITCodeLibrary):
-    """The code of a subroutine: LLVM optimises and translates it only in loops, which saves a tenth of the time."""
-
-    def _optimize_final_module(self) -> None:
-        pass
-
-    def _finalize_final_module(self) -> None:
-        self._finalized = True
-
-
-class _SubroutineCompiler(_LoopCompiler):
-    def _compile_bytecode(self) -> Any:  # noqa: ANN401 - numba declares no types
-        state = self.state
-        state.flags.no_compile = True
-        state.library = _InlinedCode(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.library.enable_object_caching()
-        result = super()._compile_bytecode()
-        name = [].append  # by which numba finds the code: any built-in method that is no other's name
-        state.targetctx.insert_user_function(name, result.fndesc, [result.library])
-        return result._replace(entry_point=name)
-
-
 def compile_loop(function: Loop) -> Loop:
     """Return `function` as a loop that numba compiles at the first call from Python and caches on disk.
 
@@ -160,7 +116,7 @@ def compile_loop(function: Loop) -> Loop:
     or loaded the code. A division by zero gives infinity: an exception would need a branch each time, and a sixth more
     time to compile.
     """
-    loop = _numba.njit(**_OPTIONS, inline="always", pipeline_class=_LoopCompiler)(function)
+    loop = _numba.njit(**_OPTIONS, inline="always")(function)
     loop._cache = _SharedCache(function)  # noqa: SLF001 - as `cache=True`, with a lock
     return cast("Loop", loop)
 
@@ -168,11 +124,9 @@ def compile_loop(function: Loop) -> Loop:
 def subroutine(function: Loop) -> Loop:
     """Return `function` as a subroutine that LLVM inlines into loops; Python cannot call it.
 
-    It compiles faster than inlined source, once for all loops that call it. It may not raise an error: its code has no
-    environment.
+    It compiles faster than inlined source, once for all loops that call it.
     """
-    options = {**_OPTIONS, "no_cpython_wrapper": True, "forceinline": True, "pipeline_class": _SubroutineCompiler}
-    return cast("Loop", _numba.njit(**options)(function))
+    return cast("Loop", _numba.njit(**_OPTIONS, no_cpython_wrapper=True, forceinline=True)(function))
 
 
 def bind_arguments(loop: Callable[..., Result], *last: object) -> Callable[..., Result]:
@@ -248,8 +202,6 @@ class _Compilation(events.Listener):
         if gc.isenabled():  # numba makes millions of permanent objects: scanning them costs a sixth of the time
             gc.disable()
             self._open.callback(gc.enable)
-            self._open.callback(gc.unfreeze)  # after `freeze`, it leaves them to the next scan of all objects
-            self._open.callback(gc.freeze)
         self._hear_ctrl_c()
 
     def on_end(self, event: Any) -> None:  # noqa: ANN401 - numba declares no types

@@ -122,8 +122,7 @@ def solve_active_set(
 
     States change at most `max_rounds` times. The result is exact for the linearised body if the rounds suffice. With a
     `compliance`, the unknowns are forces, of which there are fewer. Fills the reactions of `states`, and `steps` of
-    `system`; with a compliance only the step to equilibrium. Returns the number of systems solved, UNSETTLED or
-    SINGULAR.
+    `system`; with a compliance only the step to equilibrium. Returns the count of systems, UNSETTLED or SINGULAR.
     """
     size, steps, motion = states.state.shape[0], system.steps, system.motion
     sums, loads = np.zeros((2, 2 * size)), np.zeros(2)  # resultant: factors of steps or forces, constant part

@@ -194,10 +194,10 @@ def test_setting_up_a_mesh_counts_once_where_the_first_mesh_is_that_of_the_answe
 
 def test_where_finer_meshes_fold_at_the_free_cut_a_coarse_meshs_answer_counts_with_its_own_error_and_says_so():
     pushed = random_scene("axis", 14002, "finite")
-    loose, strict = (replace(pushed, solve=Solve("finite", tolerance=t, evidence="quick")) for t in (0.02, 0.003))
+    loose, strict = (replace(pushed, solve=Solve("finite", tolerance=t, evidence="quick")) for t in (0.03, 0.003))
     driven = replace(strict, finger=replace(strict.finger, cut="driven"))
     loose_answer, answer, driven_answer = map(solve, (loose, strict, driven))
-    assert loose_answer.error_estimate <= 0.02
+    assert loose_answer.error_estimate <= 0.03
     assert not any("folds" in warning for warning in (*loose_answer.warnings, *driven_answer.warnings))
     assert driven_answer.error_estimate <= 0.003 < answer.error_estimate
     assert "on finer ones tissue beside the free cut folds" in answer.warnings[-1]
