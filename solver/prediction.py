@@ -78,7 +78,7 @@ class NestedNumbers:
     edge_errors: Array  # (2, m, COUNT) bounds of the parts of errors that m edges of contact add, as `half_width` takes
     row: Array  # (r,) SED of the row of receptors [MPa]
     row_edge_errors: Array  # (2, m, r) such bounds for `row`
-    order: float  # order of convergence that the error estimates assume
+    factor: float  # on the change to these numbers, in the error estimates
     shares: Array | None = None  # (a + b,) of each column and row of the mesh in the SED's error, where it is too large
 
 

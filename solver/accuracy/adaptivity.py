@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from solver._kernels import OPEN, SLIP, STICK
-from solver.accuracy.convergence_order import richardson_factor
+from solver.accuracy.convergence_order import change_factor
 from solver.accuracy.error_estimate import NO_NESTED_STATE, PARTS, WIDTH, Steps, edge_errors, errors
 from solver.arrays import Array, Indices
 from solver.body import Patches
@@ -146,23 +146,23 @@ def nested_numbers(
     state depends on its load path, and `order` is its `order_of`. Returns NO_NESTED_STATE where no equilibrium exists
     with an edge moved, as at a friction limit.
     """
-    edges = edge_errors(*changes, order, linear=[WIDTH])
+    edges, factor = edge_errors(*changes, order, linear=[WIDTH]), change_factor(order, scene.solve.kinematics)
     if np.isinf(edges).any():
         return NO_NESTED_STATE
     results = values[:COUNT] if steps is None else steps.extrapolate(values[:COUNT])
-    found = NestedNumbers(results, edges[..., :COUNT], values[COUNT:], edges[..., COUNT:], order)
+    outcome = NestedNumbers(results, edges[..., :COUNT], values[COUNT:], edges[..., COUNT:], factor)
     target = scene.solve.target
-    misses_tolerance = target is not None and errors(scene, numbers, found, steps).error_estimate > target
+    misses_tolerance = target is not None and errors(scene, numbers, outcome, steps).error_estimate > target
     if not misses_tolerance and scene.solve.contrast_tolerance is None:
-        return found
+        return outcome
     finger, state = nested
     parts = np.concatenate(_grid(finger).parts(finger.displacement(state), state))
-    change = abs(float(found.numbers[0] - numbers[0]))
-    parts *= richardson_factor(order) * change / max(float(parts.sum()), np.finfo(float).tiny)
+    change = abs(float(outcome.numbers[0] - numbers[0]))
+    parts *= factor * change / max(float(parts.sum()), np.finfo(float).tiny)
     columns = np.concatenate([_columns_of_edges(*state) for state in (answer, nested)])
     np.add.at(parts, columns, edges[edges[..., 0].sum(axis=1).argmax(), :, 0])
     whole = float(parts.sum())
-    return replace(found, shares=parts / whole if whole > 0.0 else None)
+    return replace(outcome, shares=parts / whole if whole > 0.0 else None)
 
 
 def _columns_of_edges(finger: Finger[Any], state: EquilibriumState) -> Indices:

@@ -2,7 +2,8 @@
 
 The scene is solved on the mesh H of the answer and on its nested mesh h, which divides every element into four. Errors
 of quadratic elements beneath a contact fall at least with the square of the element size. The error on H is therefore
-at most 1 + 1/4 + 1/16 + ... = 4/3 of the change from H to h (Roache 1994). At a corner where stiff tissue holds soft
+at most 1 + 1/4 + 1/16 + ... = 4/3 of the change from H to h (Roache 1994), times his factor of safety at finite strain
+(`convergence_order`). At a corner where stiff tissue holds soft
 tissue, errors may fall only with the first power, and the error is at most 1 + 1/2 + 1/4 + ... = 2 of the change. The
 error on h is the series without its first term.
 
@@ -25,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from solver._kernels.active_set import SINGULAR
-from solver.accuracy.convergence_order import ORDER, richardson_factor
+from solver.accuracy.convergence_order import ORDER, change_factor, richardson_factor
 from solver.arrays import Array
 from solver.contact import ForceLoad
 from solver.equilibrium import EquilibriumState, Newton
@@ -38,12 +39,12 @@ from solver.scene.tables import USUAL_TOLERANCE
 SHIFT, WIDTH = 4, 5  # indices of the bone's shift and of the contact's width in `all_numbers`
 
 
-def half_width(change: Array, edges: Array, order: float = ORDER) -> Array:
+def half_width(change: Array, edges: Array, factor: float) -> Array:
     """Return the error estimate of results (...) from their `change` to the nested mesh and `edge_errors` (2, m, ...).
 
-    Errors fall with the power `order` of the element size.
+    `factor` is the `change_factor`.
     """
-    return richardson_factor(order) * np.abs(change) + edges.sum(axis=1).max(axis=0)
+    return factor * np.abs(change) + edges.sum(axis=1).max(axis=0)
 
 
 def edge_errors(
@@ -216,7 +217,7 @@ def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: St
         error, relative, corrected = np.full(COUNT, np.nan), np.ones(COUNT), 1.0
     else:
         change = nested.numbers - numbers
-        error = half_width(change, nested.edge_errors, nested.order)
+        error = half_width(change, nested.edge_errors, nested.factor)
         if steps is not None:
             error += steps.error
         relative = error / np.maximum(np.abs(numbers), np.finfo(float).tiny)
@@ -241,7 +242,7 @@ def row_errors(row: Array, nested: NestedNumbers | None) -> Array:
     """Return the relative errors (r,) of the SED of a row of receptors `row` (r,); nan where unknown."""
     if nested is None:
         return np.full(len(row), np.nan)
-    error = half_width(nested.row - row, nested.row_edge_errors, nested.order)
+    error = half_width(nested.row - row, nested.row_edge_errors, nested.factor)
     return error / np.maximum(row, np.finfo(float).tiny)
 
 
@@ -286,8 +287,8 @@ def contrast_error(predictions: Sequence[Prediction]) -> ContrastError:
     edges = np.stack([np.linalg.norm(nested.edge_errors[..., :count], axis=1) for _, nested in with_estimate], axis=1)
     pairs = np.array(list(combinations(range(len(with_estimate)), 2))).T
     apart = change[pairs[0]] - change[pairs[1]]
-    order = min(nested.order for _, nested in with_estimate)
-    worst = half_width(apart, np.hypot(edges[:, pairs[0]], edges[:, pairs[1]])[:, None], order)
+    factor = max(nested.factor for _, nested in with_estimate)
+    worst = half_width(apart, np.hypot(edges[:, pairs[0]], edges[:, pairs[1]])[:, None], factor)
     off_by, mean = worst.max(axis=0), numbers.mean(axis=0)
     shares = off_by / np.maximum(
         np.maximum(np.ptp(numbers, axis=0), LEAST_RANGE * mean / WARNING_SHARE), np.finfo(float).tiny
@@ -328,10 +329,11 @@ def estimate_errors(
     the load steps. Errors are infinite where contact with a moved edge has no equilibrium.
     """
     (value, on_mesh), (corrected, on_nested) = (
-        edge_changes(body, found, forces, lambda states, body=body: np.array([numbers(body, s) for s in states]))
-        for body, found in ((newton, state), nested)
+        edge_changes(body, equilibrium, forces, lambda states, body=body: np.array([numbers(body, s) for s in states]))
+        for body, equilibrium in ((newton, state), nested)
     )
-    error = half_width(corrected - value, edge_errors(on_mesh, on_nested))
+    factor = change_factor(ORDER, "small" if newton.condensed.constant else "finite")
+    error = half_width(corrected - value, edge_errors(on_mesh, on_nested), factor)
     if fewer:
         if len(fewer) != len(PARTS):
             raise ValueError(f"fewer has {len(fewer)} states; give one after each of {PARTS.tolist()} of the steps")

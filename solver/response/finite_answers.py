@@ -223,8 +223,8 @@ def solve_nested(
         return NO_NESTED_STATE, steps
     forces = None if scene.viscoelastic else forces_of(scene, state.load)
     values, nested_changes = edge_changes(finger.newton, state, forces, finger.numbers_and_row)
-    both = changes, nested_changes
-    return nested_numbers(scene, numbers, (top.finger, last), (finger, state), values, both, steps, order), steps
+    answer, nested, moves = (top.finger, last), (finger, state), (changes, nested_changes)
+    return nested_numbers(scene, numbers, answer, nested, values, moves, steps, order), steps
 
 
 FINITE_IMBALANCE = 1e-8  # relative residual of the forces from which a state is corrected further [-]

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver.accuracy.adaptivity import FingerState
-from solver.accuracy.convergence_order import order_of
+from solver.accuracy.convergence_order import change_factor, order_of
 from solver.accuracy.error_estimate import PARTS, WIDTH, edge_changes, edge_errors, half_width
 from solver.arrays import Array
 from solver.contact import ForceLoad
@@ -111,6 +111,7 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
         order = min(order_of(nested, state) for state in states_at(path, course))
     except SolveFailure:
         return CourseNumbers(usual.value * np.nan, usual.rate * np.nan)
+    factor = change_factor(order, scene.solve.kinematics)
     finer, fewer = course_numbers(course), [course_numbers(numbers) for numbers in courses]
     edges = np.zeros((2, *usual.value.shape))
     if not scene.materials.relax:
@@ -126,7 +127,7 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
         by_steps = sum(
             abs(number - value) / (1.0 / part - 1.0) for number, part in zip(by_part, PARTS.tolist(), strict=True)
         )
-        return half_width(nested_value - by_part[0], by_edges[:, None], order) + by_steps
+        return half_width(nested_value - by_part[0], by_edges[:, None], factor) + by_steps
 
     return CourseNumbers(error("value", edges), error("rate", rate_edges))
 

@@ -162,7 +162,7 @@ class SmallMeshing(Meshing):
         numbers[:, 0] = numbers[:, FORCES_AND_PLACES]
         rows = finger.row.average(displacements)
         mesh, _ = self._finger(replace(sizing, halved=True))
-        nested = _nested_numbers_of_all(finger, mesh, solutions, numbers, changes)
+        nested = nested_numbers_of_all(finger, mesh, solutions, numbers, changes)
         estimate_s = (perf_counter() - start) / len(solutions)
         return [
             prediction(solution, finger, numbers[number], rows[:, number], nested[number], estimate_s)
@@ -190,7 +190,7 @@ def _remove_round_off(
     return first if scene.viscoelastic else audits.balance(*first, SMALL_IMBALANCE, correct)
 
 
-def _nested_numbers_of_all(
+def nested_numbers_of_all(
     finger: LinearFinger,
     mesh: LinearFinger,
     solutions: Sequence[SceneSolution],
@@ -212,10 +212,9 @@ def _nested_numbers_of_all(
         with_forces = [(state, forces_of(solutions[number].scene, state.load)) for number, state in states.items()]
         values, nested_changes = edge_changes_of_all(mesh.newton, with_forces, mesh.numbers_and_row)
         for (number, state), value, nested_change in zip(states.items(), values, nested_changes, strict=True):
-            solution, both = solutions[number], (changes[number], nested_change)
-            answer, nested = (finger, solution.state), (mesh, state)
-            order = order_of(mesh, state)
+            solution, order = solutions[number], order_of(mesh, state)
+            answer, nested, moves = (finger, solution.state), (mesh, state), (changes[number], nested_change)
             out[number] = nested_numbers(
-                solution.scene, numbers[number], answer, nested, value, both, solution.steps, order
+                solution.scene, numbers[number], answer, nested, value, moves, solution.steps, order
             )
     return out
