@@ -32,24 +32,24 @@ ENOUGH = 2  # number of meshes used
 _REFINED = {"small": 1e-4, "finite": 3e-4}  # tolerance that refines the third mesh
 
 
-def fine_numbers(scenes: Sequence[Scene]) -> Array:
+def fine_numbers(scenes: Sequence[Scene], coarsening: float = 1.0) -> Array:
     """Return SED [MPa], normal force and drag [N/mm] (3, n, 3) of scenes of one finger on three meshes.
 
-    Raises SolveFailure where fewer meshes have a solution.
+    Elements are `coarsening` times as large as usual. Raises SolveFailure where fewer meshes have a solution.
     """
     solves: list[Array] = []
     meshes = _MESHES[scenes[0].solve.kinematics, any(map(depends_on_way, scenes))]
     for (fineness, step_factor), shift in product(meshes, (False, True)):
         with suppress(SolveFailure):
-            solves.append(numbers_on_mesh(scenes, fineness, shift, step_factor + shift))
+            solves.append(numbers_on_mesh(scenes, fineness / coarsening, shift, step_factor + shift))
         if len(solves) == ENOUGH:
-            return np.array([*solves, _solve_refined(scenes)])
+            return np.array([*solves, _solve_refined(scenes, coarsening)])
     raise NotConverged("Fewer than two fine meshes have a state.")
 
 
-def _solve_refined(scenes: Sequence[Scene]) -> Array:
+def _solve_refined(scenes: Sequence[Scene], coarsening: float) -> Array:
     """Return the results (n, 3) on the nested mesh of answers with a tight tolerance."""
-    tolerance = _REFINED[scenes[0].solve.kinematics]
+    tolerance = coarsening**2 * _REFINED[scenes[0].solve.kinematics]
     contrast = tolerance if len(scenes) > 1 else None
     answers = solve_many(
         [
