@@ -47,9 +47,7 @@ def half_width(change: Array, edges: Array, factor: float) -> Array:
     return factor * np.abs(change) + edges.sum(axis=1).max(axis=0)
 
 
-def edge_errors(
-    on_mesh: Array, on_nested: Array, order: float = ORDER, linear: Sequence[int] | slice = slice(0)
-) -> Array:
+def edge_errors(on_mesh: Array, on_nested: Array, order: float = ORDER, linear: Sequence[int] = ()) -> Array:
     """Return bounds (2, m + k, n) of the parts of n errors that m edges of contact add on H, and k edges on h.
 
     `on_mesh` (m, n) and `on_nested` (k, n) are the results' changes as each edge moves by a node of its mesh. A result
@@ -66,7 +64,7 @@ def edge_errors(
     on_mesh, on_nested = (factor - 1.0) / 4.0 * on_mesh, factor / 4.0 * on_nested
     out = np.zeros((2, len(on_mesh) + len(on_nested), on_mesh.shape[1]))
     out[0, : len(on_mesh)], out[1, len(on_mesh) :] = on_mesh, on_nested
-    out[:, :, linear] = 2.0 * out[:, :, linear].sum(axis=0)
+    out[:, :, list(linear)] = 2.0 * out[:, :, list(linear)].sum(axis=0)
     return out
 
 

@@ -45,18 +45,11 @@ def test_a_score_right_before_the_end_of_the_session_counts(cause, tmp_path):
     assert replay_differences(recording, tmp_path) == []
 
 
-def test_a_session_that_lost_its_client_right_after_a_score_goes_on_at_the_next_trial(tmp_path):
+@pytest.mark.parametrize("killed", [False, True])
+def test_a_session_that_lost_its_client_or_was_killed_right_after_a_score_goes_on_at_the_next_trial(killed, tmp_path):
     record(tmp_path / "s", "client")
-    end, recording = resume(tmp_path / "s")
-    assert end.complete
-    assert_kept(recording)
-    assert all(record.take.number == 1 and not record.other_takes for record in recording.trials)
-    assert replay_differences(recording, tmp_path) == []
-
-
-def test_a_session_that_was_killed_right_after_a_score_goes_on_at_the_next_trial(tmp_path):
-    record(tmp_path / "s", "client")
-    change(tmp_path / "s", "DELETE FROM events WHERE kind IN ('take_kept', 'ended')")
+    if killed:
+        change(tmp_path / "s", "DELETE FROM events WHERE kind IN ('take_kept', 'ended')")
     end, recording = resume(tmp_path / "s")
     assert end.complete
     assert_kept(recording)
