@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from daq_app.accuracy_page.page import PAGES as TABLES
@@ -10,11 +11,12 @@ from daq_app.accuracy_page.page import fill_marks
 from daq_app.cli.main import VERBS
 from drivers.catalog import DRIVERS
 from sessions.exchange import FORMATS
-from sessions.plan.protocols.protocol import protocol_names
+from sessions.plan.protocols.protocol import Protocol, protocol_names
+from solver import Scene
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-PRESENT = [page for page in PAGES if page.parent.name != "decisions" and page.name != "changed-names.md"]
+PRESENT = [page for page in PAGES if page.parent.name != "decisions"]
 PLACES = ("daq_app", "drivers", "sessions", "simulators", "solver", "tests", "benchmarks", "docs")
 CODE = [path.as_posix() for place in PLACES for path in (ROOT / place).rglob("*.py")]
 SOURCES = [Path(path).read_text(encoding="utf-8") for path in CODE]
@@ -73,6 +75,14 @@ def test_every_export_is_named_on_the_page_of_exports_to_which_the_readme_leads(
 def test_the_page_on_protocols_names_every_built_in_one():
     page = (ROOT / "docs" / "how-to" / "add-a-protocol.md").read_text(encoding="utf-8")
     assert [name for name in protocol_names() if f"\n- `{name}`" not in page] == []
+
+
+@pytest.mark.parametrize(("page", "kind"), [("how-to/add-a-protocol.md", Protocol), ("scene-file.md", Scene)])
+def test_the_page_of_a_kind_of_file_names_every_key_of_it(page, kind):
+    _, tables = msgspec.json.schema_components([kind])
+    keys = {key for table in tables.values() for key in table.get("properties", ())}
+    words = re.findall(r"`([^`\n]+)`", (ROOT / "docs" / page).read_text(encoding="utf-8"))
+    assert keys - set(re.findall(r"\w+", " ".join(words))) == set()
 
 
 def test_every_table_that_the_accuracy_run_writes_has_its_place_on_one_page():
