@@ -12,6 +12,7 @@ from daq_app.cli.main import VERBS
 from drivers.catalog import DRIVERS
 from sessions.exchange import FORMATS
 from sessions.plan.protocols.protocol import Protocol, protocol_names
+from sessions.strokes.stroke import FlawName
 from solver import Scene
 
 ROOT = Path(__file__).parents[1]
@@ -83,6 +84,11 @@ def test_the_page_of_a_kind_of_file_names_every_key_of_it(page, kind):
     keys = {key for table in tables.values() for key in table.get("properties", ())}
     words = re.findall(r"`([^`\n]+)`", (ROOT / "docs" / page).read_text(encoding="utf-8"))
     assert keys - set(re.findall(r"\w+", " ".join(words))) == set()
+
+
+def test_the_page_of_flaws_names_every_flaw():
+    page = (ROOT / "docs" / "reference" / "flaws.md").read_text(encoding="utf-8")
+    assert [name for name in FlawName if f"`{name}`" not in page] == []
 
 
 def test_every_table_that_the_accuracy_run_writes_has_its_place_on_one_page():
