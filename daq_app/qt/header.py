@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from time import monotonic
 
-from PySide6.QtCore import QPointF, Qt
+from PySide6.QtCore import QElapsedTimer, QPointF, Qt
 from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QApplication, QBoxLayout, QSizePolicy, QWidget
 
@@ -128,6 +128,9 @@ class ToDo(Panel):
     def __init__(self, primary: Callable[[], None], review: Callable[[], None]) -> None:
         super().__init__(tr("what to do now"))
         self._small = False
+        self._sends: object = None  # what the button sends in the current step
+        self._since_shown = QElapsedTimer()  # or since painted
+        self._painted = False
         self._arrow = Arrow()
         self.sentence = label("", "headline", wrap=True)
         self.sentence.setMinimumHeight(_LEAST)
@@ -141,7 +144,17 @@ class ToDo(Panel):
         room = (2 * GRID, GRID, 2 * GRID, GRID)
         hbox(self._arrow, (self.sentence, 1), self._buttons, on=self, margins=room, spacing=2 * GRID)
 
+    @property
+    def perceived(self) -> bool:
+        """Say whether people had time to see the step: what they press sooner was meant for another one."""
+        return self._since_shown.isValid() and self._since_shown.elapsed() >= QApplication.doubleClickInterval()
+
     def show_what(self, sentence: str, primary: Button | None, direction: int) -> None:
+        sends = None if primary is None else primary.sends
+        if sends != self._sends:
+            self._sends, self._painted = sends, False
+            self._since_shown.start()
+            self.update()
         set_text(self.sentence, sentence)
         self._arrow.show_direction(direction)
         self._arrow.setVisible(direction != 0 or not self._small)
@@ -153,6 +166,12 @@ class ToDo(Panel):
         if self.isVisible() and not self._small:  # parts below stay in place when the sentence gets shorter
             tallest = max(self.sentence.minimumHeight(), self.sentence.heightForWidth(self.sentence.width()))
             self.sentence.setMinimumHeight(tallest)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        if not self._painted:
+            self._painted = True
+            self._since_shown.start()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         if event.size().width() != event.oldSize().width():

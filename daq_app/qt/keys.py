@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from PySide6.QtCore import QElapsedTimer, QEvent, QObject, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
 
@@ -11,7 +11,7 @@ from daq_app.qt.layout import hbox, scroll_area, vbox
 from daq_app.qt.parts import Panel, button, is_text_field, label, label_grid
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID, px
-from daq_app.window.subject import owner
+from daq_app.window.subject import Owner, owner
 from daq_app.wording import tr, tr_noop
 
 _WIDTH = 720  # of the page, before the font's scale
@@ -27,7 +27,7 @@ class Key:
 
 
 KEYS = (
-    Key(tr_noop("Space"), "primary", tr_noop("do what the sentence says (Enter too)")),
+    Key(tr_noop("Space"), "primary", tr_noop("do what the sentence says (Enter too, unless it gives answers)")),
     Key("R", "redo", tr_noop("redo the trial on the button, with a reason unless the stroke gives one")),
     Key("Ctrl+Z", "undo", tr_noop("undo the last redo, until the next stroke: what it discarded counts again")),
     Key("S", "skip", tr_noop("skip the trial, with a reason")),
@@ -147,15 +147,25 @@ class Keyboard(QObject):
     """The keys of the experimenter's and the subject's window."""
 
     free = Signal()  # no text field or other program has the keyboard any more
+    nothing_to_give = Signal()  # the key that gives an answer was pressed while none is due
 
-    def __init__(self, window: QMainWindow, plan: QWidget, subject: SubjectWindow, act: Callable[[str], None]) -> None:
-        """Watch the subject's window and the experimenter's plan; `act` carries out the action of a key."""
+    def __init__(
+        self,
+        window: QMainWindow,
+        plan: QWidget,
+        subject: SubjectWindow,
+        act: Callable[[str], None],
+        answered_by_keys: Callable[[], bool],
+    ) -> None:
+        """Watch the subject's window and the experimenter's plan; `act` carries out the action of a key.
+
+        `answered_by_keys` says whether people of the present session can answer with this computer's keys.
+        """
         super().__init__(window)
         self._window, self._plan, self._subject, self._act = window, plan, subject, act
-        self._since_answer = QElapsedTimer()
+        self._answered_by_keys = answered_by_keys
         for widget in (plan, subject, *subject.findChildren(QWidget)):
             widget.installEventFilter(self)
-        subject.answered.connect(self._since_answer.start)
         application = QApplication.instance()
         assert isinstance(application, QApplication)
         application.focusChanged.connect(self._focus_changed)
@@ -170,14 +180,16 @@ class Keyboard(QObject):
 
     def press(self, event: QKeyEvent) -> bool:
         """Handle a key that no field took; return whether it has a meaning."""
-        match owner(name_of(event), self._subject.asks, typing=self.focused_field() is not None):
+        match self._owner(event):
             case "answer":
-                if self._subject.isVisible():  # no answers on an invisible page
+                if not self._subject.scoring:
+                    self.nothing_to_give.emit()
+                elif self._subject.isVisible():  # no answers on an invisible page
                     self._subject.take_key(event)
                 return True
             case "course":
                 act = act_of(event)
-                if act is None or event.isAutoRepeat() or self._pressed_twice(event):
+                if act is None or event.isAutoRepeat():
                     return False
                 self._act(act)
                 return True
@@ -188,22 +200,19 @@ class Keyboard(QObject):
         """Route the keys of the plan and of the subject's window to their owners."""
         if event.type() != QEvent.Type.KeyPress or not isinstance(event, QKeyEvent) or self._subject.measuring:
             return False
-        field, key = self.focused_field(), name_of(event)
-        key_owner = owner(key, self._subject.asks, typing=field is not None, from_subject=watched is not self._plan)
+        field, key_owner = self.focused_field(), self._owner(event, from_subject=watched is not self._plan)
         if watched is self._plan:  # a list would search for letters
             return (key_owner == "answer" or act_of(event) is not None) and self.press(event)
         if key_owner == "text" and field is not None:
             self._window.activateWindow()
             QApplication.sendEvent(field, event)
             return True
-        return watched is self._subject and key_owner == "course" and self.press(event)
+        is_ours = key_owner == "course" or not self._subject.scoring
+        return watched is self._subject and is_ours and self.press(event)
 
-    def _pressed_twice(self, event: QKeyEvent) -> bool:
-        """Say whether a key repeats the one that gave the answer, without a pause of the system's double-click."""
-        soon = self._since_answer.isValid() and self._since_answer.elapsed() < QApplication.doubleClickInterval()
-        if repeated := soon and event.key() == self._subject.answer_key:
-            self._since_answer.start()
-        return repeated
+    def _owner(self, event: QKeyEvent, *, from_subject: bool = False) -> Owner:
+        typing, by_keys = self.focused_field() is not None, self._answered_by_keys()
+        return owner(name_of(event), self._subject.asks, typing=typing, from_subject=from_subject, by_keys=by_keys)
 
     def _focus_changed(self, previous: QWidget | None, now: QWidget | None) -> None:
         came_here = now is not None and now.window() is self._window

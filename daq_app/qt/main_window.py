@@ -71,6 +71,7 @@ class MainWindow(QMainWindow):
         self.side.line_changed.connect(self._line_changed)
         self.subject.closed.connect(self._subject_closed)
         self.keyboard = self.side.keyboard
+        self.keyboard.nothing_to_give.connect(self._point_to_space)
         self.rooms = Rooms(bridge, self.rail, Menus(self, self.act))
         self.keys = KeysPage(self)
         self._acts = self._table()
@@ -195,8 +196,13 @@ class MainWindow(QMainWindow):
         course = self.bridge.view.course
         if course is None:
             self._start_session()
-        elif course.primary is not None and course.primary.sends is not None:
+        elif course.primary is not None and course.primary.sends is not None and self.to_do.perceived:
             self.bridge.send(course.primary.sends)
+
+    def _point_to_space(self) -> None:
+        course = self.bridge.view.course
+        if course is not None and course.primary is not None:
+            self.notice.warn(tr("Enter only gives answers while people answer at this computer. Space goes on."))
 
     def _start_session(self) -> None:
         bench = bench_of(self.bridge.state.bench)
@@ -252,7 +258,6 @@ class MainWindow(QMainWindow):
             self._left.setCurrentIndex(page)
             self._fit()
             (self.page.subject if page == 0 else self).setFocus()
-            self.subject.answer_key = None  # of another session
             if page == 1:
                 self.side.begin()
             else:

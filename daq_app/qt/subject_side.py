@@ -122,7 +122,7 @@ class SubjectSide(QObject):
         super().__init__(window)
         self._window, self._bridge, self._mirror = window, bridge, course.mirror
         self._subject, self._tablet = subject, tablet
-        self.keyboard = Keyboard(window, course.plan, subject, act)
+        self.keyboard = Keyboard(window, course.plan, subject, act, self._answered_by_keys)
         self.keyboard.free.connect(self._bring)
         subject.answered.connect(bridge.send)
         subject.answered.connect(self._let_go)
@@ -218,6 +218,9 @@ class SubjectSide(QObject):
     def _with_people(self) -> bool:
         session = self._bridge.state.session
         return session is not None and session.people != "simulated people"
+
+    def _answered_by_keys(self) -> bool:
+        return self._with_people() and (self._tablet is None or self._subject.isVisible())
 
     def _let_go(self) -> None:
         """Return the keyboard when no answer is due, unless another window has it."""

@@ -20,7 +20,7 @@ from sessions.plan.protocols.protocol import ENGLISH
 _LARGE, LARGER = 24, 36  # type that is legible with a hand on the transducer
 SHRINKING = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)  # factors of the type, until the texts fit the page
 _WIDEST = 1100  # row of the button
-GIVING = (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space)
+GIVING = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 TEXT_WIDTH = 900  # largest width of an easily read text, before the scale of the fonts
 
 
@@ -42,7 +42,6 @@ class SubjectWindow(QWidget):
         self.setAccessibleName("subject's window")
         self._view = NO_PAGE
         self._answered: SubjectView | None = None  # views repeat the question until the recorder has the answer
-        self.answer_key: int | None = None  # key that gave the last answer; None: a click or a touch
         self._stated_hand: Hand | None = None
         self._language = ENGLISH
         self._title, self._text = label(role="title", wrap=True), label(wrap=True)
@@ -160,7 +159,7 @@ class SubjectWindow(QWidget):
         self._scale.fit()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Treat Enter and Space as Next, and F11 as the switch of the full screen."""
+        """Treat Enter as Next, and F11 as the switch of the full screen."""
         if self.scoring and not self.measuring and event.key() in GIVING:
             self.take_key(event)
         elif event.key() == Qt.Key.Key_F11:
@@ -171,7 +170,7 @@ class SubjectWindow(QWidget):
     def take_key(self, event: QKeyEvent) -> None:
         """Take a key of the answer, pressed in either window."""
         if event.key() in GIVING:
-            self._give(event.key())
+            self._give()
         else:
             QApplication.sendEvent(self._answer_field.focusProxy() or self._answer_field, event)
 
@@ -235,10 +234,9 @@ class SubjectWindow(QWidget):
             set_text(self._hint, hint)
             self._fit_type()
 
-    def _give(self, key: int | None = None) -> None:
+    def _give(self) -> None:
         if not self.scoring or not self._answer_field.answered:
             return
-        self.answer_key = key
         answer_event = self._answer_field.answer_event(self._stated_hand)
         self.next.hide()  # an answer is given only once
         self._view, self._answered = NO_PAGE, self._view

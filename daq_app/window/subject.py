@@ -41,7 +41,7 @@ STEP = 1.0  # of the mark by an arrow key ...
 LEAP = 10.0  # ... and by Page Up or Page Down
 PAUSE = 1.0  # key presses further apart count as two answers [s]
 DIGITS = 1  # of a score: the resolution of the mark
-GIVES = frozenset({"Enter", "Space"})  # the present answer
+GIVES = frozenset({"Enter"})  # the present answer; Space is the experimenter's
 _PLACES = frozenset({"Left", "Right", "Up", "Down", "PgUp", "PgDown", "Home", "End"})  # the mark on the line
 TYPES = frozenset({*"0123456789.,", "Backspace", "Del"})  # a number
 CHOOSES = frozenset({"0", "1", "2", "Left", "Right"})  # one of two; 0, next to them on a keypad, does nothing
@@ -369,15 +369,18 @@ class Choice:
         return MagnitudeEstimate(number, self.first_touch, self.corrections, hand, self.device)
 
 
-def owner(key: str, asks: Kind, *, typing: bool, from_subject: bool = False) -> Owner:
+def owner(key: str, asks: Kind, *, typing: bool, from_subject: bool = False, by_keys: bool = False) -> Owner:
     """Return the owner of a key while the subject is asked for `asks`, independent of the window with the focus.
 
     While the experimenter types, keys belong to the text, even those that reached the subject's window. Keys that the
-    text does not use are never answers.
+    text does not use are never answers. Where people answer `by_keys`, the key that gives an answer never does more.
 
     >>> owner("1", "choice", typing=False), owner("1", "choice", typing=True), owner("1", "line", typing=False)
     ('answer', 'text', 'course')
+    >>> owner("Enter", "read", typing=False), owner("Enter", "read", typing=False, by_keys=True)
+    ('course', 'answer')
     """
-    if typing and (from_subject or key in ANSWER_KEYS[asks]):
+    answers = key in ANSWER_KEYS[asks] or (by_keys and key in GIVES)
+    if typing and (from_subject or answers):
         return "text"
-    return "answer" if key in ANSWER_KEYS[asks] else "course"
+    return "answer" if answers else "course"

@@ -101,7 +101,9 @@ class Driver:
 def application(tmp_path_factory):
     QSettings.setDefaultFormat(QSettings.Format.IniFormat)
     QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, str(tmp_path_factory.mktemp("settings")))
-    return QApplication.instance() or QApplication([])
+    application = QApplication.instance() or QApplication([])
+    application.setDoubleClickInterval(0)  # a test presses as soon as a step is there
+    return application
 
 
 @pytest.fixture(scope="module", autouse=True)

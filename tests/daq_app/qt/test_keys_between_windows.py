@@ -6,12 +6,11 @@ import time
 from dataclasses import replace
 
 import pytest
-from PySide6.QtCore import QElapsedTimer, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton
 
-from daq_app.qt.keys import Keyboard
 from daq_app.qt.preferences import settings
 from daq_app.qt.start import SIMULATED_BENCH
 from daq_app.recorder.messages import Connect, Disconnect
@@ -135,50 +134,77 @@ def test_a_number_that_reaches_the_experimenters_window_is_typed_whole_and_its_0
     assert driver.session.trials[0].answer == "number 20"
 
 
-def test_the_key_that_gave_the_answer_pressed_twice_does_not_go_on_with_the_course(driver, monkeypatch):
+def requests_of(driver, patch):
+    """Return the list of what the window sends from now on, while nothing reaches the recorder."""
+    messages = []
+    patch.setattr(driver.window.bridge, "send", messages.append)
+    return messages
+
+
+def test_a_press_meant_for_another_step_does_not_confirm_the_one_that_an_answer_on_a_tablet_brings(driver, monkeypatch):
     window = driver.window
     begin_scoring(driver)
-    interval = QApplication.doubleClickInterval()
     QApplication.setDoubleClickInterval(60_000)  # however slow this machine is
     try:
-        driver.answer(Qt.Key.Key_Right)
-        messages = []
+        window.bridge.send(steps.Scored(40.0))  # as from a tablet
+        driver.until(lambda: driver.session.trial == 2 and driver.session.phase == "mounting", "the next trial")
         with monkeypatch.context() as patch:
-            patch.setattr(window.bridge, "send", messages.append)
-            for place in (window.subject, window):
-                QTest.keyClick(place, ENTER)
+            messages = requests_of(driver, patch)
+            QTest.keyClick(window, SPACE)
+            QTest.mouseClick(window.to_do.primary, Qt.MouseButton.LeftButton)
             assert messages == []
-            QTest.keyClick(window.subject, SPACE)
+            QApplication.setDoubleClickInterval(0)
+            QTest.keyClick(window, SPACE)
             assert messages == [driver.view.course.primary.sends]
     finally:
-        QApplication.setDoubleClickInterval(interval)
+        QApplication.setDoubleClickInterval(0)
 
 
-def test_the_key_that_gave_the_answer_pressed_twenty_times_in_a_row_is_one_answer(driver, monkeypatch):
-    window, now, messages = driver.window, [0], []
-
-    class Timer(QElapsedTimer):
-        """A stopwatch on the time of the test [ms]."""
-
-        def start(self):
-            super().start()
-            self.began = now[0]
-
-        def elapsed(self):
-            return now[0] - self.began
-
+def test_a_step_counts_as_seen_from_when_it_was_painted_even_by_a_window_that_was_busy(driver, monkeypatch):
+    to_do = driver.window.to_do
     begin_scoring(driver)
-    keyboard = window.findChild(Keyboard)
-    monkeypatch.setattr(keyboard, "_since_answer", Timer())
+    monkeypatch.setattr(to_do, "paintEvent", lambda _: None)
+    window_is_busy, view = 0.2, driver.view
+    try:
+        to_do.show_what("Mount it.", replace(view.course.buttons["note"], sends=steps.StimulusMounted("K1")), 0)
+        time.sleep(window_is_busy)
+        monkeypatch.undo()
+        QApplication.setDoubleClickInterval(round(1e3 * window_is_busy / 2))
+        to_do.repaint()
+        assert not to_do.perceived
+        driver.until(lambda: to_do.perceived, "the time to see it")
+    finally:
+        QApplication.setDoubleClickInterval(0)
+        driver.window.show_view(view)
+
+
+def test_enter_of_a_subject_goes_on_with_nothing_however_slowly_it_is_pressed_and_space_gives_no_answer(
+    driver, monkeypatch
+):
+    window = driver.window
+    begin_scoring(driver)
+    QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
+    for place in (window.subject, window.subject.line, window):
+        QTest.keyClick(place, SPACE)  # the experimenter's, who does not wait
+    assert (driver.session.phase, window.subject.line.answer.score) == ("scoring", 50.0)
+    driver.answer()
+    with monkeypatch.context() as patch:
+        messages = requests_of(driver, patch)
+        for place in (window.subject, window, window.course.plan) * 3:
+            QTest.keyClick(place, ENTER)
+            QTest.keyClick(place, Qt.Key.Key_Enter)
+        assert messages == []
+        assert "Space goes on" in window.notice._label.text()
+        QTest.keyClick(window.subject, SPACE)
+        assert messages == [driver.view.course.primary.sends]
+
+
+def test_enter_goes_on_where_no_person_answers_at_this_computer(driver, monkeypatch):
+    begin_scoring(driver)
     driver.answer(Qt.Key.Key_Right)
-    keyboard._since_answer.start()
-    monkeypatch.setattr(window.bridge, "send", messages.append)
-    for _ in range(20):
-        now[0] += QApplication.doubleClickInterval() // 2
-        QTest.keyClick(window.subject, ENTER)
-    assert messages == []
-    now[0] += QApplication.doubleClickInterval()
-    QTest.keyClick(window.subject, ENTER)
+    monkeypatch.setattr(driver.window.keyboard, "_answered_by_keys", lambda: False)  # but on a tablet
+    messages = requests_of(driver, monkeypatch)
+    QTest.keyClick(driver.window, ENTER)
     assert messages == [driver.view.course.primary.sends]
     monkeypatch.undo()
 
@@ -255,7 +281,7 @@ def test_a_redo_by_mistake_is_undone_with_a_key_and_the_replay_of_the_session_ag
 def test_the_page_of_the_next_session_has_no_code_proposes_the_next_and_enter_begins_none(driver):
     driver.begin()
     driver.abort()
-    QTest.keyClick(driver.window, ENTER)
+    QTest.keyClick(driver.window, SPACE)
     assert driver.session is None
     assert driver.window.page.subject.text() == ""
     assert driver.window.page.subject.placeholderText() == "e.g. P08"  # after P07

@@ -82,7 +82,7 @@ def begin(desk, folder):
 def mount_asked(folder, number):
     """Wait until a stimulus is asked for, and until the sentence that says so can have been read."""
     count(folder, "mount_asked", number)
-    time.sleep(0.5)
+    time.sleep(1.5)
 
 
 def answer_by_keys(desk, folder, number):
