@@ -6,7 +6,7 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
@@ -58,6 +58,9 @@ class CardFrame(Panel):
         regrade(self.message, "wrong")
 
 
+_LOOK_AGAIN = 3000  # for sessions that were in use [ms]
+
+
 class CutShort(Panel):
     """Lists the sessions that can be resumed; hidden if there are none."""
 
@@ -74,11 +77,19 @@ class CutShort(Panel):
         self.go_on = button(tr("Resume it"), name, lambda: send(ResumeSession(self._sessions.currentData())))
         heading = label(tr("▲ Sessions that were cut short"), wrap=True)
         fill(QVBoxLayout(self), heading, self._sessions, self._description, self.go_on)
+        self._folder = Path()
+        self._again = QTimer(self, singleShot=True, interval=_LOOK_AGAIN)
+        self._again.timeout.connect(lambda: (page := self.parentWidget()) and page.isVisible() and self._look())
         self._new_list.connect(self.show_sessions, Qt.ConnectionType.QueuedConnection)
         self.show_sessions(())
 
     def look_in(self, folder: Path) -> None:
-        """Search a folder for such sessions without blocking the window."""
+        """Search a folder for such sessions without blocking the window, again and again while one is in use."""
+        self._folder = folder
+        self._look()
+
+    def _look(self) -> None:
+        folder = self._folder
 
         def look() -> None:
             sessions = unfinished_sessions(folder)
@@ -88,6 +99,10 @@ class CutShort(Panel):
         threading.Thread(target=look, daemon=True).start()
 
     def show_sessions(self, sessions: tuple[UnfinishedSession, ...]) -> None:
+        """Show the sessions that no recorder writes; one that is in use may be free soon."""
+        if any(session.in_use for session in sessions):
+            self._again.start()
+        sessions = tuple(session for session in sessions if not session.in_use)
         if sessions != self._items:
             self._items = sessions
             self._sessions.clear()

@@ -21,7 +21,7 @@ be created. Use `Recorder` from one thread; another thread calls `wake` whenever
 
 The recorder is a child process at the other end of two pipes; no port is open. Ctrl-C and the closing of a
 terminal do not reach it. **When the client goes** (ends, is killed, closes the pipe), a running session is recorded
-until the finger has lifted, 30 s at most, then gets a written end whose cause is `client`, and the process ends.
+until the finger has lifted, 10 s at most, then gets a written end whose cause is `client`, and the process ends.
 `ResumeSession(folder)`, sent to a new recorder, goes on at the same trial. **When the recorder goes**, the last report
 is `Gone`, all that was reported as safe is on the disk, and the same `ResumeSession` continues.
 """

@@ -26,7 +26,7 @@ from sessions.plan.study import StudyError, study_key
 from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter, Setting, provenance
 from sessions.recording.head import certificate_for, simulated_sentence, software_versions, without_home
 from sessions.recording.manifest import is_sealed
-from sessions.recording.recovery import fold_log
+from sessions.recording.recovery import LIFT_PATIENCE, fold_log
 from sessions.recording.storage import RESERVE, check_room, unsafe
 from sessions.run import resuming
 from sessions.run.runner import STOPPED_BY_USER, Continuation, Ending, Operator, run_session
@@ -82,7 +82,6 @@ def _windows(state: int) -> bool:
     return windows is not None and windows.kernel32.SetThreadExecutionState(state) != 0
 
 
-LIFT_PATIENCE_NS = 30_000_000_000  # for a finger in contact when the client goes [session clock]
 CLIENT_GONE = "the window or terminal that ran the session is gone"
 ANY_FOLDER = "recorded in an unsafe folder"  # name of a setting
 SURFACE_FRICTION = "planted friction"  # name of a setting: descriptor, index and friction of simulated surfaces
@@ -246,7 +245,7 @@ class _Operator:
             return None
         now_ns = self._clock.now_ns()
         self._alone_ns = now_ns if self._alone_ns is None else self._alone_ns
-        if self._touching and now_ns - self._alone_ns < LIFT_PATIENCE_NS:
+        if self._touching and now_ns - self._alone_ns < LIFT_PATIENCE * 1e9:
             return None
         return "client", CLIENT_GONE
 

@@ -98,6 +98,7 @@ class UnfinishedSession:
 
     folder: Path
     description: str
+    in_use: bool = False  # a recorder still writes it: of another window, or of one that is gone
 
 
 def bench_of(bench: BenchState) -> Bench:
@@ -264,8 +265,9 @@ def unfinished_sessions(folder: Path) -> tuple[UnfinishedSession, ...]:
         if len(unfinished) == _LONGEST_LIST:
             break
         try:
-            if is_sealed(file.parent) or is_in_use(file):
+            if is_sealed(file.parent):
                 continue
+            in_use = is_in_use(file)
             recording = Recording.open(file.parent)
             check_resumable(recording)
         except (RecordingError, OSError):
@@ -277,7 +279,7 @@ def unfinished_sessions(folder: Path) -> tuple[UnfinishedSession, ...]:
             "{subject}, {begun}: trials done {done} of {count}",
             subject=subject, begun=start, done=number, count=len(trials),
         )  # fmt: skip
-        unfinished.append(UnfinishedSession(file.parent, description))
+        unfinished.append(UnfinishedSession(file.parent, description, in_use))
     return tuple(unfinished)
 
 

@@ -26,6 +26,9 @@ BIG_ENDIAN_SUMS = 0x377F0683
 LITTLE_ENDIAN_SUMS = 0x377F0682
 PAGE_SIZES = frozenset(2**power for power in range(9, 17))  # that SQLite knows [bytes]
 _SHARED_BYTES = (510, 0x40000002)  # how many, and from where: SQLite's SHARED_SIZE and SHARED_FIRST (os.h)
+# How long a recorder whose client is gone waits for the finger to lift [s, session clock]. A stroke takes less, and its
+# take is discarded if it had no answer.
+LIFT_PATIENCE = 10.0
 _HOLE = (0, 0, 0, 0, 0, 0)  # a frame where nothing was ever written
 
 
@@ -219,5 +222,6 @@ def fold_log(folder: Path, events: Sequence[LoggedEvent]) -> None:
         if code not in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
             raise RecordingError(f"{live} cannot take its log in ({error}); {remedy(error)}") from error
         raise RecordingError(
-            f"{live} is in use ({error}); end the program that still writes it, or reads it"
+            f"{live} is in use: end the program that still writes it, or reads it; a recorder whose window or terminal"
+            f" is gone ends as soon as the finger is lifted, after {LIFT_PATIENCE:g} s at most: then try again"
         ) from error

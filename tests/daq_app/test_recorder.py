@@ -37,6 +37,7 @@ from daq_app.recorder.messages import (
     Tared,
 )
 from sessions.recording import LoggedEvent, Recording
+from sessions.recording.schema import LIVE_FILE
 from sessions.run.runner import Status
 from sessions.run.steps import (
     AskMount,
@@ -226,7 +227,9 @@ def test_a_recorder_that_is_killed_has_lost_nothing_it_told_of_and_its_session_g
         start_stroke(desk, folder)
         with Recorder.start(PACE) as another:
             another.send(ResumeSession(str(folder)))
-            assert "is in use" in Desk(another).until(Failed).sentence
+            sentence = Desk(another).until(Failed).sentence
+            assert f"{folder / LIVE_FILE} is in use" in sentence
+            assert "lifted, after 10 s at most: then try again" in sentence
         os.kill(first.pid, signal.SIGKILL)
         report = desk.until(Gone)
     assert not report.requested

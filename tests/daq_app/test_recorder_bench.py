@@ -1,16 +1,20 @@
 """The recorder's bench and its display, in this process on the simulated transducer."""
 
+from threading import Event
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from session_messages import INFO
 
 from daq_app.recorder.bench import Bench
 from daq_app.recorder.display import Display
-from daq_app.recorder.messages import Device, Failed, HealthReport, LinkBack, LinkDown, Live, NoDevice, Tared
+from daq_app.recorder.messages import Device, Failed, HealthReport, LinkBack, LinkDown, Live, NoDevice, People, Tared
+from daq_app.recorder.session import CLIENT_GONE, _Operator
 from drivers.clock import RealClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import Health, LinkLost, SetupError
-from sessions.recording import RecordingError
+from sessions.recording import LoggedEvent, RecordingError
 
 
 class Seat:
@@ -153,3 +157,19 @@ def test_zero_and_greatest_loads_stay_when_the_same_transducer_answers_again_and
     seat.bench.uri = "sim:?seed=8"
     assert not seat.until(LinkBack).same
     assert seat.until(Live).zero == (0.0,) * 6
+
+
+def test_a_finger_that_stays_holds_a_session_without_a_client_no_longer_than_a_stroke_takes():
+    now_ns = [0]
+    clock, inbox = SimpleNamespace(now_ns=lambda: now_ns[0]), SimpleNamespace(stop_wanted=Event(), exhausted=False)
+    prepared = SimpleNamespace(clock=clock, info=None, people=People(), plan=SimpleNamespace(forces=False))
+    operator = _Operator(prepared, None, None, inbox, lambda _: None)
+    operator.take_safe([LoggedEvent(1, 0, "contact_onset", 1, 0, {})])
+    assert operator.stop() is None
+    inbox.exhausted = True
+    ends = {}
+    for second in range(20):
+        now_ns[0] = second * 1_000_000_000
+        ends[second] = operator.stop()
+    assert ends[5] is None
+    assert ends[10] == ends[19] == ("client", CLIENT_GONE)

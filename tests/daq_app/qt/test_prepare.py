@@ -232,6 +232,24 @@ def test_sessions_that_were_cut_short_are_looked_for_in_the_folder_that_is_chose
     page.cut_short.show_sessions(())
 
 
+def test_a_session_that_a_recorder_without_a_window_still_holds_is_offered_as_soon_as_it_lets_go(driver, monkeypatch):
+    cut_short, looks = driver.window.page.cut_short, []
+    cut_short._again.setInterval(10)
+
+    def look(place):
+        looks.append(place)
+        return (UnfinishedSession(place / "P03", "P03", in_use=len(looks) < 3),)
+
+    monkeypatch.setattr("daq_app.qt.cards.unfinished_sessions", look)
+    driver.window.page.look_for_unfinished_sessions()
+    cut_short.show_sessions((UnfinishedSession(looks[0] / "P03", "P03", in_use=True),))
+    assert not cut_short.isVisible()
+    driver.until(cut_short.isVisible, "the offer to go on")
+    driver.until(lambda: not cut_short._again.isActive(), "the last look")
+    assert len(looks) == 3
+    cut_short.show_sessions(())
+
+
 @pytest.mark.usefixtures("application")
 def test_a_number_is_typed_of_digits_alone():
     field = NumberField(lambda: 0.0)

@@ -120,9 +120,11 @@ def test_a_session_that_another_window_records_is_not_said_to_be_cut_short(tmp_p
 
     process, reports = fork(record)
     assert lines_of(reports, 1)
-    assert unfinished_sessions(tmp_path) == ()
+    assert [session.in_use for session in unfinished_sessions(tmp_path)] == [True]
     kill(process)
-    assert [session.folder for session in unfinished_sessions(tmp_path)] == [tmp_path / "P01"]
+    assert [(session.folder, session.in_use) for session in unfinished_sessions(tmp_path)] == [
+        (tmp_path / "P01", False)
+    ]
 
 
 def test_a_height_that_was_measured_is_recorded_as_measured_and_one_that_nobody_stated_as_a_default():
