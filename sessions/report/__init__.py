@@ -23,6 +23,7 @@ from sessions.statistics.pooled import rival_values, subject_function
 from sessions.statistics.rivals import RIVAL_NAMES, rivals_of_means
 from sessions.statistics.scores import (
     ScoreTable,
+    block_scores,
     by_key,
     distinct_sessions,
     mean_scores,
@@ -155,9 +156,10 @@ def experiments(
         trials = [row for row in visit.rows if row.block == block.name]
         descriptor = trials[0].descriptor
         indices = tuple(sorted({row.index for row in trials}))
-        means = tuple(mean for mean in mean_scores(tables) if mean.descriptor == descriptor and mean.index in indices)
+        in_block = block_scores(tables, block.name, descriptor)
+        means = tuple(mean for mean in mean_scores(in_block) if mean.index in indices)
         score_of = {mean.index: mean.mean for mean in means}
-        rows = score_matrix(tables, descriptor)
+        rows = score_matrix(in_block, descriptor)
         own_scores = {i: score for i, score in rows.get(plan.subject, {}).items() if len(rows) > 1 and i in indices}
         series = _surface_series(trials)
         responses = series.get(label, {})

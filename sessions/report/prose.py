@@ -153,12 +153,6 @@ def summary(report: Report) -> tuple[str, ...]:
         sentences.append(f"{plural(len(subjects), 'subject')} scored {plural(stimuli, 'stimulus', 'stimuli')}.")
     if report.course is not None or report.strokes:
         sentences.append(_strokes(report))
-    by_descriptor = by_key((e.descriptor, e.name) for e in report.experiments if e.scores)
-    sentences += [
-        f"{capital(' and '.join(names))} judge {descriptor} alike: a surface's score is its mean over these blocks."
-        for descriptor, names in by_descriptor.items()
-        if len(names) > 1
-    ]
     for results in session_functions(report):
         sentences += psychometric_sentences(results)
     for experiment in report.experiments:

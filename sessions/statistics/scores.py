@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TypeVar
 
@@ -69,6 +69,7 @@ class Score:
     descriptor: str  # e.g. "stickiness"
     index: int  # the stimulus's number on the descriptor
     score: float  # 0 to 100
+    block: str = ""  # name of the block in which it was given
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,8 +101,9 @@ def score_table(recording: Recording) -> ScoreTable:
     """Return a session's scores on the line, of main trials alone. Raises Blinded while the stimuli's key is sealed."""
     subject = recording.plan.subject
     scores = tuple(
-        Score(subject, record.trial.stimulus.descriptor, record.trial.stimulus.known_index, record.score)
+        Score(subject, stimulus.descriptor, stimulus.known_index, record.score, record.trial.block)
         for record in recording.trials
+        for stimulus in [record.trial.stimulus]
         if record.score is not None and record.trial.phase == "main"
     )
     return ScoreTable(str(recording.folder.resolve()), subject, recording.simulated, scores, _other_answers(recording))
@@ -126,6 +128,16 @@ def _other_answers(recording: Recording) -> str:
 def distinct_sessions(tables: Iterable[ScoreTable]) -> tuple[ScoreTable, ...]:
     """Return each session once, in order of first occurrence."""
     return tuple(copies[0] for copies in by_key((table.session, table) for table in tables).values())
+
+
+def block_scores(tables: Iterable[ScoreTable], block: str, descriptor: str) -> tuple[ScoreTable, ...]:
+    """Return tables with the scores of one block alone; of a session without it, all its scores on the descriptor."""
+
+    def of_block(scores: Sequence[Score]) -> tuple[Score, ...]:
+        judged = [score for score in scores if score.descriptor == descriptor]
+        return tuple(score for score in judged if score.block == block) or tuple(judged)
+
+    return tuple(replace(table, scores=of_block(table.scores)) for table in tables)
 
 
 def subject_scores(tables: Iterable[ScoreTable]) -> tuple[Score, ...]:

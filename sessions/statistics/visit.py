@@ -227,7 +227,9 @@ def visit_from(
 
 def scores_of(visit: Visit, rows: Sequence[TrialRow]) -> ScoreTable:
     """Return the scores in some rows of a visit."""
-    scores = tuple(Score(visit.subject, row.descriptor, row.index, row.score) for row in rows if row.score is not None)
+    scores = tuple(
+        Score(visit.subject, row.descriptor, row.index, row.score, row.block) for row in rows if row.score is not None
+    )
     return ScoreTable(visit.session, visit.subject, bool(visit.simulated), scores)
 
 

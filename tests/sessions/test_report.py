@@ -18,7 +18,7 @@ from sessions.plan.plan import Frame, SessionPlan
 from sessions.prediction import PredictionOptions, predict
 from sessions.recording import LoggedEvent, Recording, SessionWriter, provenance
 from sessions.recording.log import trial_records
-from sessions.report import Further, findings
+from sessions.report import Further, experiments, findings
 from sessions.report.contents import GroundTruth
 from sessions.report.facts import exclusion_sentences, people, remarks
 from sessions.report.figures.relation import relation_panel
@@ -28,6 +28,7 @@ from sessions.report.tables.session import relation_table
 from sessions.report.trials import _extremes, course
 from sessions.report.wording import shown_response
 from sessions.statistics.scores import Score, ScoreTable, score_table
+from sessions.statistics.visit import scores_of, visit_from
 from sessions.strokes.analysis import analyse
 
 
@@ -108,6 +109,26 @@ def test_scores_of_other_visits_are_joined_by_subject(session):
     assert mean.n == 3
     assert mean.mean == pytest.approx((own_score / 2 + 40 + 60) / 3)
     assert list(report.experiments[0].answers) == ["P01", "P02", "P03"]
+
+
+def test_two_blocks_on_one_descriptor_have_their_own_scores_each(session):
+    recording, analysis, _ = session
+    first = recording.plan.blocks[0]
+    back = dataclasses.replace(
+        first, name="back", trials=tuple(dataclasses.replace(t, block="back") for t in first.trials)
+    )
+    own = visit_from(recording, analysis, None, {}, {})
+    rows = [row for row in own.rows if row.block == first.name]
+    backwards = [dataclasses.replace(row, block="back", score=100.0 - row.score, sed=row.index) for row in rows]
+    both = dataclasses.replace(own, rows=(*rows, *backwards))
+    elsewhere = visit("P02", 40.0)  # by a protocol without such blocks
+    tables = (scores_of(both, both.rows), elsewhere)
+    there, again = experiments(dataclasses.replace(recording.plan, blocks=(first, back)), tables, both)
+    for experiment, block_rows in ((there, rows), (again, backwards)):
+        assert experiment.own_scores == {row.index: row.score for row in block_rows}
+        assert experiment.answers["P02"][experiment.indices.index(50)] == 40.0
+    scores, seds = zip(*((again.own_scores[row.index], row.sed) for row in backwards), strict=True)
+    assert again.own_relation.pearson == pytest.approx(np.corrcoef(scores, seds)[0, 1])
 
 
 def test_the_scores_of_whoever_made_the_strokes_stand_beside_the_mean_of_all(session, prediction_and_report):

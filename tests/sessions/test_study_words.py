@@ -125,14 +125,6 @@ def test_an_interval_of_r_in_short_comes_with_its_assumption():
     assert assumption not in prose.summary(example(experiments=(replace(stickiness, score_relation=none),)))
 
 
-def test_a_session_of_two_blocks_on_one_descriptor_says_whose_mean_a_score_is():
-    stickiness = experiments_of(tables(1))[0]
-    twice = (stickiness, replace(stickiness, name="back"))
-    sentences = prose.summary(example(experiments=twice))
-    assert "Stickiness and back judge stickiness alike: a surface's score is its mean over these blocks." in sentences
-    assert not [text for text in prose.summary(example()) if "mean over these blocks" in text]
-
-
 def test_without_a_correlation_nothing_would_change_its_sign():
     (stickiness, _) = experiments_of(tables(1))
     alone = replace(stickiness.score_relation, pearson=None)
