@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 from report_example import TABLES, example
-from scipy import optimize, stats
+from scipy import linalg, optimize, stats
 from study_example import study
 
 from sessions.report.figures import picture
@@ -18,7 +18,7 @@ from sessions.statistics.correlations import (
     Contrast,
     required_cases,
 )
-from sessions.statistics.mixed_model import crossed_aic
+from sessions.statistics.mixed_model import akaike_weights, crossed_aic
 from sessions.statistics.rivals import (
     MODEL_MU,
     MODEL_SED,
@@ -224,42 +224,63 @@ def parts_of(x, what):
     return surface_mean, x - surface_mean
 
 
-def test_akaikes_criterion_is_that_of_the_dense_normal_density_with_two_slopes():
+def contrasts_of(x, what):
+    """Return the contrasts of n scores (n - 3, n) that are free of intercept and both slopes."""
+    return linalg.null_space(np.column_stack([np.ones(len(x)), *parts_of(x, what)]).T).T
+
+
+def test_akaikes_criterion_is_that_of_the_dense_normal_density_of_contrasts_free_of_both_slopes():
     draw = np.random.default_rng(4)
     who, what = np.repeat(np.arange(6), 5), np.tile(np.arange(5), 6)
     x = draw.normal(size=30)
-    between, within = parts_of(x, what)
+    contrasts = contrasts_of(x, what)
     y = 2.0 + 1.5 * x + draw.normal(0.0, 2.0, 6)[who] + draw.normal(0.0, 1.0, 5)[what] + draw.normal(size=30)
 
     def dense(at):
-        same = [(group[:, None] == group[None, :]) * math.exp(2 * at[i]) for i, group in enumerate((who, what), 3)]
-        covariance = same[0] + same[1] + np.eye(30) * math.exp(2 * at[5])
-        return -2.0 * stats.multivariate_normal.logpdf(y, at[0] + at[1] * between + at[2] * within, covariance)
+        same = [(group[:, None] == group[None, :]) * math.exp(2 * at[i]) for i, group in enumerate((who, what))]
+        covariance = contrasts @ (same[0] + same[1] + np.eye(30) * math.exp(2 * at[2])) @ contrasts.T
+        return -2.0 * stats.multivariate_normal.logpdf(contrasts @ y / y.std(), np.zeros(27), covariance)
 
     options = {"maxiter": 8000, "maxfev": 8000, "xatol": 1e-7, "fatol": 1e-9, "adaptive": True}
-    least = optimize.minimize(dense, np.zeros(6), method="Nelder-Mead", options=options)
+    least = optimize.minimize(dense, np.zeros(3), method="Nelder-Mead", options=options)
     assert crossed_aic([str(name) for name in who], what, list(map(str, what)), y, x) == pytest.approx(
         least.fun + 2 * 2, abs=1e-5
     )
 
 
-def test_a_slope_that_no_stroke_can_show_is_not_counted():
-    """Akaike's criterion has 2 for each parameter: equal strokes on a surface leave one slope, as do equal surfaces."""
+def test_no_unit_of_score_or_quantity_moves_akaikes_criterion_nor_any_slope_that_no_stroke_can_show():
+    """Equal strokes on a surface leave one slope, as do equal surfaces."""
     draw = np.random.default_rng(5)
     who, what = np.repeat(np.arange(6), 5), np.tile(np.arange(5), 6)
     y = 20.0 * draw.normal(size=5)[what] + draw.normal(size=30)
-    people = [str(name) for name in who]
+    groups = [str(name) for name in who], what, list(map(str, what))
     surface = draw.normal(size=5)[what]
-    tiny = surface + 1e-6 * draw.normal(size=30)  # its slope within surfaces explains noise alone
-    assert (
-        0.0
-        <= crossed_aic(people, what, list(map(str, what)), y, surface)
-        + 2.0
-        - crossed_aic(people, what, list(map(str, what)), y, tiny)
-        < 8.0
-    )
+    both = surface + 0.1 * draw.normal(size=30)
+    one = surface + 1e-6 * draw.normal(size=30)  # its slope within surfaces explains noise alone
+    for x in (surface, both):
+        assert crossed_aic(*groups, 0.1 * y, 1e3 * x) == pytest.approx(crossed_aic(*groups, y, x))
+    assert crossed_aic(*groups, y, surface) < crossed_aic(*groups, y, one)
     shared = 0.3 * (1.0 + draw.normal(size=6)[who])  # the same mean on each surface
-    assert math.isfinite(crossed_aic(people, what, list(map(str, what)), y, shared))
+    assert math.isfinite(crossed_aic(*groups, y, shared))
+
+
+@pytest.mark.parametrize("studies", [60, pytest.param(300, marks=pytest.mark.slow)])
+def test_the_greatest_weight_of_five_surfaces_claims_no_more_than_how_often_it_is_right(studies):
+    """Six quantities are alike; surfaces differ in more. Maximum likelihood claims 0.80 and is right in 77 %."""
+    draw, claims, hits = np.random.default_rng(36), [], []
+    who, what = np.repeat(np.arange(10), 5), np.tile(np.arange(5), 10)
+    groups = [str(name) for name in who], what, list(map(str, what))
+    for _ in range(studies):
+        means = np.linspace(-1.4, 1.4, 5) + 0.3 * draw.normal(size=(6, 5))
+        strokes = means[:, what] + 0.3 * draw.normal(size=(6, 10))[:, who] + 0.2 * draw.normal(size=(6, 50))
+        true = draw.integers(6)
+        slope, level, more = 1.0 + 0.1 * draw.normal(size=10), 3.0 * draw.normal(size=10), 10.0 * draw.normal(size=5)
+        usual = 25.0 * slope[who] * (0.7 * means[true, what] + 0.3 * strokes[true])
+        score = 50.0 + usual + level[who] + more[what] + 4.0 * draw.normal(size=50)
+        weights = akaike_weights([crossed_aic(*groups, score, x) for x in strokes])
+        claims.append(max(weights))
+        hits.append(weights.index(max(weights)) == true)
+    assert np.mean(claims) <= np.mean(hits) + 0.02
 
 
 def judged_by_surface(draw, subjects=10):
@@ -315,13 +336,13 @@ def test_no_spreads_of_a_grid_are_likelier_than_those_of_akaikes_criterion(seed)
         + 5.0 * draw.normal(size=5)[what]
         + 3.0 * draw.normal(size=40)
     )
-    columns = np.column_stack([np.ones(40), *parts_of(x, what)])
+    contrasts = contrasts_of(x, what)
+    z = contrasts @ y / y.std()
 
     def dense(level, surface):
         v = np.eye(40) + level**2 * (who[:, None] == who) + surface**2 * (what[:, None] == what)
-        inverse = np.linalg.inv(v)
-        residuals = y - columns @ np.linalg.solve(columns.T @ inverse @ columns, columns.T @ inverse @ y)
-        return np.linalg.slogdet(v)[1] + 40 * (1.0 + np.log(2.0 * np.pi * (residuals @ inverse @ residuals) / 40))
+        v = contrasts @ v @ contrasts.T
+        return np.linalg.slogdet(v)[1] + 37 * (1.0 + np.log(2.0 * np.pi * (z @ np.linalg.solve(v, z)) / 37))
 
     grid = np.geomspace(0.02, 20.0, 25)
     least = min(dense(level, surface) for level in (0.0, *grid) for surface in (0.0, *grid))
