@@ -4,6 +4,7 @@ from pathlib import Path
 
 import against_the_paper
 import looks
+import study_keys
 
 from daq_app.cli import main
 from daq_app.qt import start
@@ -16,6 +17,7 @@ def write(folder: Path) -> None:
         "command-line": command_line(),
         "against-the-paper": against_the_paper.page(),
         "looks": looks.page(),
+        "study-keys": study_keys.page(),
     }
     looks.write_pictures(folder)
     for name, text in pages.items():

@@ -1,5 +1,6 @@
 """What the docs name is there: files, headings, and in README every verb."""
 
+import importlib
 import re
 from pathlib import Path
 
@@ -52,6 +53,16 @@ def test_every_member_of_a_class_that_a_page_names_is_there(page):
     for name, member in re.findall(r"`([A-Z]\w+)\.([a-z]\w*)[`(]", page.read_text(encoding="utf-8")):
         files = [text for text in SOURCES if re.search(rf"^class {name}\b", text, re.MULTILINE)]
         assert not files or any(re.search(rf"\b{member}\b", text) for text in files), f"{name}.{member}"
+
+
+def test_every_number_of_a_study_has_a_meaning_in_the_reference(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    page = importlib.import_module("study_keys").page()
+    rows = [row for row in page.splitlines() if re.match(r"\| `\w+` \| `[^`]*\b(float|int)\b", row)]
+    assert len(rows) > 100
+    assert [row for row in rows if row.endswith("|  |")] == []
+    assert "`left_out_error`" in page
+    assert "[points]" in next(row for row in rows if "left_out_error" in row)
 
 
 def test_readme_names_every_verb():

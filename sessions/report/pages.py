@@ -6,7 +6,6 @@ import io
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -29,8 +28,9 @@ from sessions.report.tables import split_off_appendix
 from sessions.report.tables.session import tables as session_tables
 from sessions.report.tables.study import study_tables
 from sessions.report.tables.study_models import missing_models, missing_scores
+from sessions.statistics.correlations import Contrast
 from sessions.statistics.findings import StudyFindings
-from sessions.statistics.multiverse import CHOICE_LABELS
+from sessions.statistics.multiverse import CHOICE_LABELS, PathFinding
 from sessions.statistics.rivals import Rival
 from sessions.statistics.visit import TrialRow, exclusion_of
 from sessions.strokes.stroke import meanings
@@ -200,14 +200,38 @@ def _columns(study: StudyFindings) -> Mapping[str, tuple[str, str]]:
 
 def columns_csv(study: StudyFindings) -> str:
     """Return a row for each column of `trials_csv`: its name, its unit and its meaning."""
-    rows = ([heading(name, unit), unit, meaning] for name, (unit, meaning) in _columns(study).items())
-    return _csv([["column", "unit", "meaning"], *rows])
+    return _columns_csv({heading(name, unit): (unit, meaning) for name, (unit, meaning) in _columns(study).items()})
+
+
+def _columns_csv(columns: Mapping[str, tuple[str, str]]) -> str:
+    return _csv([["column", "unit", "meaning"], *([name, *meaning] for name, meaning in columns.items())])
+
+
+_DESCRIPTOR = {"descriptor": ("", "what was judged")}
+_CHOICES = {choice: ("", f"choice of this path: {label}") for choice, label in CHOICE_LABELS.items()}
+_PATH_NUMBERS = {"r": "r_of_means", "within": "r_within_subjects"}  # columns with another name than the field
+_PATHS = _DESCRIPTOR | _CHOICES | {_PATH_NUMBERS.get(name, name): text for name, text in meanings(PathFinding).items()}
+_KIND = {"kind": ("", "means: over subjects, of each surface; within: of trials, within subjects")}
+_CONTRAST_COLUMNS = {
+    "difference": "difference", "low": "difference_low", "high": "difference_high", "z": "steiger_z", "p": "p"
+}  # fmt: skip
+_RIVAL, _CONTRAST = meanings(Rival), meanings(Contrast)
+_RIVALS = _DESCRIPTOR | _KIND | _RIVAL | {column: _CONTRAST[name] for name, column in _CONTRAST_COLUMNS.items()}
+
+
+def path_columns_csv() -> str:
+    """Return a row for each column of `paths_csv`, as `columns_csv`."""
+    return _columns_csv(_PATHS)
+
+
+def rival_columns_csv() -> str:
+    """Return a row for each column of `rivals_csv`, as `columns_csv`."""
+    return _columns_csv(_RIVALS)
 
 
 def paths_csv(study: StudyFindings) -> str:
     """Return a row for each path and descriptor, for R and pandas as `trials_csv`."""
-    columns = ("usual", "surfaces", "trials", "r_of_means", "r_within_subjects", "low", "high")
-    rows: list[list[object]] = [["descriptor", *CHOICE_LABELS, *columns]]
+    rows: list[list[object]] = [list(_PATHS)]
     for descriptor in study.descriptors:
         for path in descriptor.paths:
             numbers = (path.surfaces, path.trials, path.r, path.within, path.low, path.high)
@@ -218,14 +242,12 @@ def paths_csv(study: StudyFindings) -> str:
 
 def rivals_csv(study: StudyFindings) -> str:
     """Return a row for each quantity correlated with scores, of means and within subjects, for R and pandas."""
-    columns = [field.name for field in fields(Rival) if field.name not in ("contrast", "reasons")]
-    contrast_columns = ["difference", "difference_low", "difference_high", "steiger_z", "p"]
-    rows: list[list[object]] = [["descriptor", "kind", *columns, *contrast_columns]]
+    rows: list[list[object]] = [list(_RIVALS)]
     for descriptor in study.descriptors:
         for level, rivals in (("means", descriptor.rivals_of_means), ("within", descriptor.rivals)):
             for rival in rivals:
-                contrast = [getattr(rival.contrast, name, None) for name in ("difference", "low", "high", "z", "p")]
-                numbers = [*(getattr(rival, name) for name in columns), *contrast]
+                contrast = [getattr(rival.contrast, name, None) for name in _CONTRAST_COLUMNS]
+                numbers = [*(getattr(rival, name) for name in _RIVAL), *contrast]
                 rows.append([descriptor.descriptor, level, *numbers])
     return _csv(rows, simulated=bool(study.simulated))
 

@@ -4,12 +4,14 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtri, stdtr, stdtrit
 
 from drivers.arrays import Array
+from sessions.strokes.stroke import Meaning
 
 CONFIDENCE = 0.95
 TAILS = ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2)  # probabilities of the ends of an interval
@@ -25,16 +27,16 @@ _PERFECT = 1.0 - 1e-12  # Fisher's z is infinite at 1
 class Relation:
     """The relation of y to x over n stimuli. A number is None where `reason` says why."""
 
-    n: int
-    pearson: float | None = None
+    n: int  # stimuli
+    pearson: float | None = None  # r
     low: float | None = None  # 95 % interval of pearson (Fisher's z)
-    high: float | None = None
-    spearman: float | None = None
+    high: float | None = None  # its upper end
+    spearman: float | None = None  # rho
     spearman_low: float | None = None  # 95 % interval of spearman (Fisher's z, its error by Bonett & Wright 2000)
-    spearman_high: float | None = None
+    spearman_high: float | None = None  # its upper end
     spearman_p: float | None = None  # exact, two-sided: the share of orders whose rho is at least as far from 0
-    slope: float | None = None  # least-squares line y = intercept + slope x
-    intercept: float | None = None
+    slope: float | None = None  # least-squares line y = intercept + slope x [unit of y over that of x]
+    intercept: float | None = None  # of that line [unit of y]
     without: tuple[tuple[int, float | None], ...] = ()  # (label, pearson over the others) for each stimulus left out
     reason: str | None = None
 
@@ -162,11 +164,11 @@ class Contrast:
     """The difference of two correlations with scores, each variable signed so that its r is positive."""
 
     n: int  # cases that have all three; within subjects, trials
-    difference: float  # of the two correlations
-    low: float | None  # its 95 % interval
-    high: float | None
-    z: float | None  # Steiger's; None where the interval is the jackknife's
-    p: float | None  # two-sided; None for identical cases
+    difference: Annotated[float, Meaning("", "r of the model's quantity less r of this one, both made positive")]
+    low: Annotated[float | None, Meaning("", "lower end of its 95 % interval")]
+    high: Annotated[float | None, Meaning("", "upper end")]
+    z: Annotated[float | None, Meaning("", "Steiger's; none where the interval is the jackknife's")]
+    p: Annotated[float | None, Meaning("", "of no difference, two-sided; none for identical cases")]
 
 
 def steiger_z(first: float, second: float, mutual: float, n: int) -> float | None:

@@ -76,9 +76,9 @@ class NormalisedScores:
 class SurfaceMean:
     """Means over subjects of one surface; None without a number of any subject."""
 
-    index: int
+    index: int  # of the surface
     subjects: int  # whose stroke gave a response
-    mu: Average | None
+    mu: Average | None  # coefficient of friction that the model used
     response: Average | None  # the model's quantity that is compared with scores [MPa or -]
     normal_force: Average | None  # measured [N]
     model_normal_force: Average | None  # of the model, pressed to its depth [N]
@@ -90,13 +90,13 @@ class DescriptorFindings:
     """Findings of a study about one descriptor."""
 
     descriptor: str
-    indices: tuple[int, ...]
+    indices: tuple[int, ...]  # of the stimuli
     scores: tuple[MeanScore, ...]
     within: tuple[WithinMean, ...]
     agreement: Agreement | None
     surfaces: tuple[SurfaceMean, ...]
-    answers: Mapping[str, tuple[float | None, ...]]  # subject -> score of each index
-    points: tuple[tuple[str, int, float, float], ...]  # subject, index, response to its own stroke, score
+    answers: Mapping[str, tuple[float | None, ...]]  # subject -> score of each index [points]
+    points: tuple[tuple[str, int, float, float], ...]  # subject, index, response to its own stroke [MPa or -], score
     mean_relation: Relation | None  # mean response against mean score
     repeated: RepeatedCorrelation | None  # of a subject's scores with the responses to its own strokes
     repeated_holm: float | None  # its p, adjusted for the number of descriptors
@@ -104,7 +104,7 @@ class DescriptorFindings:
     rivals_of_means: tuple[Rival, ...]  # the same for means over subjects
     without_subject: tuple[tuple[str, float], ...]  # subject left out, r within the other subjects
     normalised: NormalisedScores
-    differences: tuple[Difference, ...]
+    differences: tuple[Difference, ...]  # between the scores of two surfaces
     estimates: Estimates | None
     exponent: Exponent | None  # of magnitude estimates on the µ of the model; None without estimates
     scales: tuple[PairedScale, ...]  # of choices between two, by both models; () without choices
@@ -116,6 +116,7 @@ class DescriptorFindings:
     fingers: Spread | None  # spread of the logarithm of mu between subjects, without surface effects [-]
     paths: tuple[PathFinding, ...]  # () where not requested
     constant_stimuli: ConstantStimuli | None = None  # None without such comparisons
+    # By kind of judgement and index, with mean 0, in standard deviations of the difference of two judgements
     latent: Mapping[Judgement, Mapping[int, IntervalEstimate]] = field(
         default_factory=dict[Judgement, Mapping[int, IntervalEstimate]]
     )
@@ -132,10 +133,10 @@ class EffectRecovery(msgspec.Struct, frozen=True):
 
     descriptor: str
     effect: str
-    true_value: float = msgspec.field(name="planted")
-    estimate: float
-    low: float
-    high: float
+    true_value: float = msgspec.field(name="planted")  # of the effect, in the unit that `UNITS` states
+    estimate: float  # in the same unit
+    low: float  # 95 % interval
+    high: float  # its upper end
 
     @property
     def covered(self) -> bool:
@@ -149,7 +150,7 @@ class FrictionRecovery:
 
     strokes: int  # with a true and an estimated mu
     median_error: float  # of mu, relative [-]
-    worst_error: float
+    worst_error: float  # of mu, relative [-]
     intervals: int  # number of intervals of mu
     covered: int  # number of these that contain the true mu
 

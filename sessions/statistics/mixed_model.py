@@ -216,9 +216,9 @@ def akaike_weights(criteria: Sequence[float]) -> tuple[float, ...]:
 class Spread:
     """A standard deviation with its 95 % interval; 0 where subjects differ no more than residuals explain."""
 
-    sd: float
-    low: float
-    high: float
+    sd: float  # the standard deviation
+    low: float  # 95 % interval
+    high: float  # its upper end
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,7 +228,7 @@ class Spreads:
     level: Spread  # of the subjects' levels, at the mean of the covariate [unit of y]
     slope: Spread | None  # of their slopes on the covariate [unit of y over unit of x]; None without one
     left: Spread  # of y about each subject's line: the noise of single trials
-    subjects: int
+    subjects: int  # with such trials
     dof: int  # of the residuals
 
 
@@ -240,9 +240,9 @@ class Term:
     """One fixed effect with its 95 % interval."""
 
     name: str
-    estimate: float
-    low: float
-    high: float
+    estimate: float  # score per unit of the covariate that `name` states [points]
+    low: float  # 95 % interval
+    high: float  # its upper end
     p: float  # two-sided
 
 
@@ -252,10 +252,10 @@ class MixedModel:
 
     terms: tuple[Term, ...]
     middle: float  # mean of the first covariate, where intercept and subjects' levels are defined
-    between_sd: float  # of the subjects' levels
-    within_sd: float  # of the residuals
-    n: int
-    subjects: int
+    between_sd: float  # of the subjects' levels [points]
+    within_sd: float  # of the residuals [points]
+    n: int  # trials
+    subjects: int  # with such trials
     slope_sd: float  # of the subjects' slopes on the first covariate
     singular: bool  # a spread is 0, or level and slope are perfectly correlated
     spreads: Spreads | None  # the same standard deviations by least squares, with intervals; None with too few subjects

@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Annotated
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from sessions.statistics.scores import by_key, surface_means
 from sessions.statistics.within_subjects import repeated_correlation
 from sessions.strokes import Analysis, FrictionParameters, analyse
 from sessions.strokes.settings import AnalysisSettings, FilterSettings, Pair, SteadySettings, WindowRule
-from sessions.strokes.stroke import FIXED, HERTZ_EXPONENT, AreaLaw, Rule
+from sessions.strokes.stroke import FIXED, HERTZ_EXPONENT, AreaLaw, Meaning, Rule
 
 Values = tuple[float | None, ...]  # of one quantity along each of `PATHS`, or only those at small strain
 
@@ -187,13 +188,17 @@ class PathFinding:
     """Correlation of a predicted quantity with scores along one path. None with too few numbers."""
 
     path: Path
-    usual: bool
-    surfaces: int  # with a score and a prediction on this path
-    trials: int  # likewise
-    r: float | None  # Pearson's, of the mean prediction of each surface against its mean score
-    within: float | None  # repeated-measures correlation of each subject's own scores and predictions
-    low: float | None  # 95 % interval of `within`, for other subjects on the same surfaces
-    high: float | None
+    usual: Annotated[bool, Meaning("", "yes for the path of all other results")]
+    surfaces: Annotated[int, Meaning("", "with a score and a prediction on this path")]
+    trials: Annotated[int, Meaning("", "with a score and a prediction on this path")]
+    r: Annotated[float | None, Meaning("", "correlation of the mean prediction of each surface with its mean score")]
+    within: Annotated[
+        float | None, Meaning("", "repeated-measures correlation of each subject's own scores and predictions")
+    ]
+    low: Annotated[
+        float | None, Meaning("", "lower end of its 95 % jackknife interval, for other subjects on the same surfaces")
+    ]
+    high: Annotated[float | None, Meaning("", "upper end")]
 
 
 @dataclass(frozen=True, slots=True)

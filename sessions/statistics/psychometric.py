@@ -55,7 +55,7 @@ class Level:
 class Psychometric:
     """One psychometric function. Without values `reason` says why."""
 
-    answers: int
+    answers: int  # all that were given
     pse: IntervalEstimate | None = None  # log ratio at which both are chosen equally often [-]
     # From the PSE to three of four choices, without lapses, in log ratio; 0 where answers step between two levels [-].
     jnd: IntervalEstimate | None = None
@@ -64,7 +64,7 @@ class Psychometric:
     correlation: IntervalEstimate | None = None
     order: IntervalEstimate | None = None  # log ratio added by coming second; None where orders are unknown [-]
     rises: bool = True  # the comparison is chosen more often with greater magnitude
-    log_likelihood: float | None = None
+    log_likelihood: float | None = None  # of all answers, natural logarithm
     deviance: float | None = None  # of the binomial law, against a separate probability for every level and order
     freedom: int | None = None  # degrees of freedom of that deviance
     reason: str = ""

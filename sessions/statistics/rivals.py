@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from sessions.statistics.correlations import (
 from sessions.statistics.mixed_model import akaike_weights, crossed_aic
 from sessions.statistics.scores import by_key, surface_means
 from sessions.statistics.within_subjects import repeated_correlation
+from sessions.strokes.stroke import Meaning
 
 MODEL_SED = SED.label  # the published quantity, the default for comparisons
 MODEL_MU = "µ of the model"
@@ -47,22 +49,32 @@ _NO_LINE = "without one of the surfaces the others do not determine a line"
 class Rival:
     """The correlation of one quantity with the scores. A number is None where `reasons` says why, by its name."""
 
-    name: str
-    n: int  # surfaces, or within subjects trials, with the quantity and a score
-    r: float | None
-    low: float | None  # 95 % interval: Fisher's z; within subjects the jackknife's over subjects
-    high: float | None
+    name: Annotated[str, Meaning("", "the quantity")]
+    n: Annotated[int, Meaning("", "surfaces, or within subjects trials, with the quantity and a score")]
+    r: Annotated[float | None, Meaning("", "its correlation with the scores")]
+    low: Annotated[
+        float | None,
+        Meaning("", "lower end of its 95 % interval: Fisher's z; within subjects the jackknife over subjects"),
+    ]
+    high: Annotated[float | None, Meaning("", "upper end")]
     contrast: Contrast | None = None  # the model's r less this one
-    partial: float | None = None  # r given the µ of the model
-    partial_low: float | None = None  # 95 % interval: Fisher's z; within subjects the jackknife of z
-    partial_high: float | None = None
-    # Root mean square error of a surface's scores by the line through the others [points]
-    left_out_error: float | None = None
-    weight: float | None = None  # Akaike's, of the mixed model of `crossed_aic`
-    # Orders the surfaces as the model's quantity, or exactly in reverse; None where it lacks one of them
-    same_order: bool | None = None
-    # Surfaces needed by Steiger's test to distinguish the two correlations of means; None without a test of these
-    needed: int | None = None
+    partial: Annotated[float | None, Meaning("", "r given the µ of the model")] = None
+    partial_low: Annotated[float | None, Meaning("", "lower end of its 95 % interval, as for r")] = None
+    partial_high: Annotated[float | None, Meaning("", "upper end")] = None
+    left_out_error: Annotated[
+        float | None,
+        Meaning("points", "root mean square error of a surface's scores by the line through the other surfaces"),
+    ] = None
+    weight: Annotated[float | None, Meaning("", "Akaike's, of a mixed model on the quantity; within subjects only")] = (
+        None
+    )
+    same_order: Annotated[
+        bool | None,
+        Meaning("", "whether it orders surfaces as the model's quantity, or in reverse; none where it lacks one"),
+    ] = None
+    needed: Annotated[
+        int | None, Meaning("", "surfaces that Steiger's test needs to distinguish both; none without a test of means")
+    ] = None
     reasons: dict[str, str] = field(default_factory=dict[str, str])
 
 

@@ -53,8 +53,8 @@ class PairedScale:
     """The scale of one set of choices. Without values `reason` says why."""
 
     model: Model
-    choices: int
-    subjects: int
+    choices: int  # all that were made
+    subjects: int  # who made them
     # By index, with mean 0, in logits or z
     values: Mapping[int, IntervalEstimate] = field(default_factory=dict[int, IntervalEstimate])
     first: IntervalEstimate | None = None  # advantage of coming first, in the same unit
@@ -225,9 +225,9 @@ NAME = "log magnitude"
 class Exponent:
     """Stevens' exponent, by two methods. None where `reason` says why."""
 
-    subjects: int
-    trials: int
-    plain: Term | None  # slope of the mixed model, with exact magnitudes
+    subjects: int  # who gave them
+    trials: int  # with an estimate and a µ
+    plain: Term | None  # slope of the mixed model, with exact magnitudes [-]
     # Deming's slope through the surfaces, and its 95 % interval; None for identical subjects
     deming: tuple[float, float | None, float | None] | None = None
     error_ratio: float | None = None  # error variance of a surface's log answer over that of its log magnitude [-]

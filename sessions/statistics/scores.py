@@ -40,9 +40,9 @@ def bounds(low: float | None, high: float | None) -> tuple[float, float] | None:
 class IntervalEstimate:
     """A value with its 95 % interval; an end is None where the data give no bound, or with too few subjects."""
 
-    value: float
-    low: float | None
-    high: float | None
+    value: float  # the estimate
+    low: float | None  # 95 % interval
+    high: float | None  # its upper end
 
     @property
     def ends(self) -> tuple[float, float] | None:
@@ -55,10 +55,10 @@ class Average:
     """A mean over subjects."""
 
     n: int  # subjects, each one's repeats averaged first
-    mean: float
+    mean: float  # of the subjects
     sd: float | None  # between subjects; None for a single subject
     low: float | None  # 95 % t interval; None for a single subject, or identical values
-    high: float | None
+    high: float | None  # its upper end
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,12 +88,14 @@ class MeanScore:
     """Mean answer of n subjects to one stimulus. A bound is None where `reason` says why."""
 
     descriptor: str
-    index: int
+    index: int  # of the stimulus
     n: int  # subjects, not trials
-    mean: float
-    sd: float | None  # standard deviation between subjects
-    low: float | None  # 95 % t interval of the mean, clipped to the scale, which contains the population's mean
-    high: float | None
+    mean: float  # of the scores [points]
+    sd: float | None  # standard deviation between subjects [points]
+    low: (
+        float | None
+    )  # 95 % t interval of the mean, clipped to the scale, which contains the population's mean [points]
+    high: float | None  # its upper end [points]
     reason: str | None
 
 
@@ -134,8 +136,8 @@ def block_scores(tables: Iterable[ScoreTable], block: str, descriptor: str) -> t
     """Return tables with the scores of one block alone; of a session without it, all its scores on the descriptor."""
 
     def of_block(scores: Sequence[Score]) -> tuple[Score, ...]:
-        judged = [score for score in scores if score.descriptor == descriptor]
-        return tuple(score for score in judged if score.block == block) or tuple(judged)
+        on_descriptor = [score for score in scores if score.descriptor == descriptor]
+        return tuple(score for score in on_descriptor if score.block == block) or tuple(on_descriptor)
 
     return tuple(replace(table, scores=of_block(table.scores)) for table in tables)
 

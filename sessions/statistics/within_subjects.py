@@ -19,20 +19,20 @@ Table = Mapping[str, Mapping[int, float]]  # subject -> the stimulus's index -> 
 class WithinMean:
     """Mean of one stimulus with its within-subject interval."""
 
-    index: int
+    index: int  # of the stimulus
     n: int  # subjects who scored every stimulus
-    mean: float
-    low: float | None  # None where all subjects have equal differences between stimuli
-    high: float | None
+    mean: float  # of the scores [points]
+    low: float | None  # None where all subjects have equal differences between stimuli [points]
+    high: float | None  # upper end of the interval [points]
 
 
 @dataclass(frozen=True, slots=True)
 class RepeatedCorrelation:
     """The relation of y to x within subjects, with the same slope for all (Bakdash & Marusich 2017)."""
 
-    r: float
+    r: float  # the repeated-measures correlation
     low: float  # 95 % interval by Fisher's z, for `dof` degrees of freedom: for independent pairs
-    high: float
+    high: float  # its upper end
     p: float  # two-sided, for independent pairs
     dof: int  # N - k - 1 for N pairs from k subjects
     subjects: int  # with at least two pairs: a single pair has no variation within its subject
@@ -142,12 +142,12 @@ def agreement(table: Table) -> Agreement | None:
 class Difference:
     """Mean difference of the scores of two stimuli, within subjects."""
 
-    low_index: int
-    high_index: int
+    low_index: int  # of one stimulus
+    high_index: int  # of the other
     n: int  # subjects who scored both
-    mean: float  # score of `high_index` less that of `low_index`
-    low: float  # 95 % t interval
-    high: float
+    mean: float  # score of `high_index` less that of `low_index` [points]
+    low: float  # 95 % t interval [points]
+    high: float  # its upper end [points]
     p: float  # paired t test, two-sided
     p_holm: float  # adjusted for the number of pairs (Holm 1979, Scand. J. Stat. 6:65)
 

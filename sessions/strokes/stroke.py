@@ -218,7 +218,7 @@ class AreaLaw:
     """Contact area = planned area x (N / force)^exponent; `exponent` is 0 for a fixed area."""
 
     law: Literal["fixed", "hertz", "power"] = "fixed"
-    exponent: float = 0.0
+    exponent: float = 0.0  # of the force [-]
     force: float = PLANNED_AT  # [N]
 
     def area(self, normal: Array, planned_area: float) -> Array:

@@ -120,10 +120,10 @@ def test_two_blocks_on_one_descriptor_have_their_own_scores_each(session):
     own = visit_from(recording, analysis, None, {}, {})
     rows = [row for row in own.rows if row.block == first.name]
     backwards = [dataclasses.replace(row, block="back", score=100.0 - row.score, sed=row.index) for row in rows]
-    both = dataclasses.replace(own, rows=(*rows, *backwards))
+    session_visit = dataclasses.replace(own, rows=(*rows, *backwards))
     elsewhere = visit("P02", 40.0)  # by a protocol without such blocks
-    tables = (scores_of(both, both.rows), elsewhere)
-    there, again = experiments(dataclasses.replace(recording.plan, blocks=(first, back)), tables, both)
+    tables = (scores_of(session_visit, session_visit.rows), elsewhere)
+    there, again = experiments(dataclasses.replace(recording.plan, blocks=(first, back)), tables, session_visit)
     for experiment, block_rows in ((there, rows), (again, backwards)):
         assert experiment.own_scores == {row.index: row.score for row in block_rows}
         assert experiment.answers["P02"][experiment.indices.index(50)] == 40.0

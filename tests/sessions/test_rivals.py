@@ -255,9 +255,9 @@ def test_no_unit_of_score_or_quantity_moves_akaikes_criterion_nor_any_slope_that
     y = 20.0 * draw.normal(size=5)[what] + draw.normal(size=30)
     groups = [str(name) for name in who], what, list(map(str, what))
     surface = draw.normal(size=5)[what]
-    both = surface + 0.1 * draw.normal(size=30)
+    varied = surface + 0.1 * draw.normal(size=30)
     one = surface + 1e-6 * draw.normal(size=30)  # its slope within surfaces explains noise alone
-    for x in (surface, both):
+    for x in (surface, varied):
         assert crossed_aic(*groups, 0.1 * y, 1e3 * x) == pytest.approx(crossed_aic(*groups, y, x))
     assert crossed_aic(*groups, y, surface) < crossed_aic(*groups, y, one)
     shared = 0.3 * (1.0 + draw.normal(size=6)[who])  # the same mean on each surface

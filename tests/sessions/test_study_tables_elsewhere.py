@@ -11,7 +11,15 @@ import pytest
 from scipy import stats
 from study_example import INDICES, study, visit
 
-from sessions.report.pages import _MEANING, columns_csv, paths_csv, trials_csv
+from sessions.report.pages import (
+    _MEANING,
+    columns_csv,
+    path_columns_csv,
+    paths_csv,
+    rival_columns_csv,
+    rivals_csv,
+    trials_csv,
+)
 from sessions.report.tables.study import study_tables
 from sessions.statistics.pooled import pool_visits
 from sessions.statistics.visit import TrialRow
@@ -56,6 +64,16 @@ def test_every_field_of_a_trial_has_a_column_with_its_meaning(findings):
     assert heads == [row[0] for row in list(csv.reader(columns_csv(findings).splitlines()))[1:]]
     assert {field.name for field in fields(TrialRow)} - {"paths", "responses"} == set(_MEANING)
     assert {"stretch_along_skin", "von_mises_mpa"} <= {head.lower() for head in heads}
+
+
+@pytest.mark.parametrize(("table", "columns"), [(rivals_csv, rival_columns_csv), (paths_csv, path_columns_csv)])
+def test_every_column_of_rivals_and_paths_has_a_meaning_and_the_error_a_unit(findings, table, columns):
+    heads = table(findings).splitlines()[0].removeprefix("SIMULATED,").split(",")
+    rows = [*csv.DictReader(columns().splitlines())]
+    assert heads == [row["column"] for row in rows]
+    assert all(row["meaning"] for row in rows)
+    units = {row["column"]: row["unit"] for row in rows if row["unit"]}
+    assert units == ({"left_out_error": "points"} if table is rivals_csv else {})
 
 
 @pytest.mark.skipif(RSCRIPT is None, reason="no R to open the table in")

@@ -241,7 +241,8 @@ def _files(output: Path, options: VisitOptions) -> dict[str, Path]:
     from sessions.report import pages  # drawing is slow to load
 
     names = {"page": "study.html", "table": pages.TRIALS, "columns": pages.TRIAL_COLUMNS, "numbers": "study.json"}
-    names |= {"rivals": "rivals.csv"} | ({} if options.paths == "none" else {"paths": "paths.csv"})
+    names |= {"rivals": "rivals.csv", "rival_columns": "rivals-columns.csv"}
+    names |= {} if options.paths == "none" else {"paths": "paths.csv", "path_columns": "paths-columns.csv"}
     files = {content: output / name for content, name in names.items()}
     pages.check_place(*files.values())
     return files
@@ -256,7 +257,9 @@ def _write(study: StudyFindings, name: str, files: Mapping[str, Path]) -> None:
         "columns": pages.columns_csv(study),
         "numbers": json_text(study.to_dict()),
         "rivals": pages.rivals_csv(study),
+        "rival_columns": pages.rival_columns_csv(),
         "paths": pages.paths_csv(study),
+        "path_columns": pages.path_columns_csv(),
     }
     for content, path in files.items():
         pages.swap_in(path, texts[content])
@@ -274,4 +277,5 @@ def _print(study: StudyFindings, files: Mapping[str, Path], console: Console) ->
             f"{effect.descriptor}, {effect.effect} [{UNITS[effect.effect]}]: true {number(effect.true_value)}, "
             f"estimated {number(effect.estimate)} ({span(effect.low, effect.high)}): {inside}"
         )
-    console.say(*(f"{name:8}  {path}" for name, path in files.items()))
+    width = max(map(len, files))
+    console.say(*(f"{name:{width}}  {path}" for name, path in files.items()))
