@@ -47,7 +47,14 @@ class WrongValue(Exception):
 
 
 class RecordingKept(KeyboardInterrupt):
-    """A stop or a crash ended work that had already recorded data; the message names the folder (exit code 3)."""
+    """A stop or a crash ended work that had already recorded data; the message names the folder (exit code 3).
+
+    A script gets a document with the `kind` of the end, the message, and the verb's own keys in `document`.
+    """
+
+    def __init__(self, message: str, kind: str, **document: object) -> None:
+        super().__init__(message)
+        self.document = {**document, "error": {"kind": kind, "message": message}}
 
 
 class NotWritten(Exception):

@@ -98,7 +98,11 @@ def _dispatch(arguments: list[str]) -> int:
         return DONE
     options = parser.parse_args(_join_values(verb_arguments))
     console = Console(as_json=options.json)
-    return console.exit_code(verb.run(options, console))
+    try:
+        return console.exit_code(verb.run(options, console))
+    except RecordingKept as ending:
+        console.result(**ending.document)
+        raise
 
 
 def _join_values(arguments: list[str]) -> list[str]:

@@ -3,7 +3,8 @@
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Literal, Never, TextIO
 
@@ -193,6 +194,16 @@ def attend_session(recorder: Recorder, request: m.StartSession | m.ResumeSession
         return _Attendance(recorder, console, interrupted).to_the_end()
 
 
+@contextmanager
+def further_keys(keys: Callable[[], Mapping[str, object]]) -> Generator[None]:
+    """Add a verb's own keys to the document of a session that cannot be followed further."""
+    try:
+        yield
+    except RecordingKept as ending:
+        ending.document |= keys()
+        raise
+
+
 class _Attendance:
     def __init__(self, recorder: Recorder, console: Console, interrupted: Interruptions) -> None:
         self._recorder = recorder
@@ -231,9 +242,8 @@ class _Attendance:
     def _leave_silent_recorder(self) -> Never:
         if self._start is None:
             raise KeyboardInterrupt
-        raise RecordingKept(
-            f"stopped; the recorder does not answer and will end the session on its own, in {self._start.folder}"
-        )
+        sentence = "stopped; the recorder does not answer and will end the session on its own, in "
+        raise _not_followed(f"{sentence}{self._start.folder}", "stopped", self._start.folder)
 
     def _watch_silence(self) -> None:
         """Report once when the recorder stops answering, and once when it answers again."""
@@ -283,8 +293,15 @@ def _raise_failure(report: m.Report, folder: str = "") -> None:
     """Raise the failure in a report, of a session in `folder` if any, as the command line expects it."""
     match report:
         case m.Failed(_, sentence, "DiskRefused") if folder:
-            raise RecordingKept(sentence)
+            raise _not_followed(sentence, "disk", folder)
         case m.Failed(_, sentence, kind):
             raise _FAILURES.get(kind, RecordingError)(sentence)
         case m.Gone(_, sentence):
-            raise RecordingKept(f"{sentence}, with 'daq-app resume {folder}'") if folder else RecordingError(sentence)
+            if not folder:
+                raise RecordingError(sentence)
+            raise _not_followed(f"{sentence}, with 'daq-app resume {folder}'", "recorder", folder)
+
+
+def _not_followed(sentence: str, kind: str, folder: str) -> RecordingKept:
+    """Return the end of a session that cannot be followed further, with the keys of one that can."""
+    return RecordingKept(sentence, kind, session=folder, end=None, sealed=False)

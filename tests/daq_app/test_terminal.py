@@ -1,6 +1,7 @@
 """A person at a terminal: what is typed there, and what becomes of a session when the terminal goes."""
 
 import io
+import json
 import os
 import re
 import signal
@@ -12,10 +13,11 @@ from pathlib import Path
 import pytest
 from desk import Desk
 
+from daq_app.cli.main import run
 from daq_app.cli.terminal import Terminal
 from daq_app.console import Console, accept_any_text
 from daq_app.recorder.client import Recorder
-from daq_app.recorder.messages import SessionEnded
+from daq_app.recorder.messages import SessionBegun, SessionEnded
 from sessions.plan.protocols.planning import plan
 from sessions.plan.protocols.protocol import protocol
 from sessions.recording import Recording
@@ -203,3 +205,31 @@ def test_the_last_line_before_a_terminal_closes_is_heard(tmp_path):
     assert process.returncode == 3, process.stderr
     assert [event.data.get("text") for event in Recording.open(folder).events if event.kind == "note"] == ["seen"]
     assert Recording.open(folder).end["reason"] == "ill"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="kill -9 needs POSIX")
+def test_a_script_gets_a_document_of_a_session_whose_recorder_is_killed_at_its_beginning_and_after_it_is_resumed(
+    tmp_path, capsys, monkeypatch
+):
+    poll = Recorder.poll
+
+    def poll_and_kill(recorder, timeout=0.0):
+        reports = poll(recorder, timeout)
+        if any(isinstance(report, SessionBegun) for report in reports):
+            recorder.kill()
+        return reports
+
+    monkeypatch.setattr(Recorder, "poll", poll_and_kill)
+    folder = tmp_path / "P07"
+    people = ("--headless", "--simulate-subject", "7", "--json")
+    begin = ("run", "sensotact-friction", "--scores-only", "--subject", "P07", "--seed", "7", "--out", str(folder))
+    for command, further in ((begin, {"seed": 7}), (("resume", str(folder)), {"gap": None})):
+        assert run([*command, *people]) == 3
+        output = capsys.readouterr()
+        document = json.loads(output.out)
+        error = document.pop("error")
+        document.update(dict.fromkeys({"gap"} & set(document)))  # whether it is written already, and how long
+        assert document == {"session": str(folder), "end": None, "sealed": False, **further}
+        assert error["kind"] == "recorder"
+        assert f"with 'daq-app resume {folder}'" in error["message"]
+        assert f"daq-app: {error['message']}" in output.err

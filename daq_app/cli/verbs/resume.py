@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from daq_app.cli.options import add_flag, add_session, add_shared
-from daq_app.cli.terminal import attend_session
+from daq_app.cli.terminal import attend_session, further_keys
 from daq_app.console import DONE, FLAWED, Console, WrongValue
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import People, ResumeSession
@@ -42,10 +42,15 @@ def run(options: argparse.Namespace, console: Console) -> int:
         raise WrongValue(f"--pace {options.pace:g} is not allowed: the session began with {factor:g}")
     simulated = options.simulate_subject
     people = None if simulated is None else People("simulated people", simulated)
-    with Recorder.start(factor, debug=options.debug) as recorder:
+    with Recorder.start(factor, debug=options.debug) as recorder, further_keys(lambda: {"gap": _gap(folder)}):
         outcome = attend_session(recorder, ResumeSession(str(folder.absolute()), options.device, people), console)
     end, folder = outcome.end, Path(outcome.folder)
-    gap = next(event.data["gap"] for event in reversed(Recording.open(folder).events) if event.kind == "resumed")
-    console.result(session=str(folder), end=asdict(end), sealed=outcome.sealed, gap=gap)
+    console.result(session=str(folder), end=asdict(end), sealed=outcome.sealed, gap=_gap(folder))
     console.say(f"{folder}: {end.reason}; {end.readings} readings in all, {end.health.lost} lost since it was resumed")
     return outcome.exit_code
+
+
+def _gap(folder: Path) -> float | None:
+    """Return the gap before the last resumption [s]; None if the wall clock did not tell."""
+    resumptions = (event for event in reversed(Recording.open(folder).events) if event.kind == "resumed")
+    return next((event.data["gap"] for event in resumptions), None)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import get_args
 
 from daq_app.cli.options import add_body_arguments, add_flag, add_number, add_shared, body_of, measures_sentence
-from daq_app.cli.terminal import attend_session, open_device
+from daq_app.cli.terminal import attend_session, further_keys, open_device
 from daq_app.console import Console, WrongValue
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import People, StartSession
@@ -78,7 +78,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         frame = session_plan.frame if bench is None else bench.frame or session_plan.frame
         session_plan = replace(session_plan, frame=frame.with_values(options.normal, options.height))
         request = StartSession(session_plan, str(folder.absolute()), people, settings, any_folder=options.any_folder)
-        outcome = attend_session(recorder, request, console)
+        with further_keys(lambda: {"seed": seed}):
+            outcome = attend_session(recorder, request, console)
     end = outcome.end
     if Path(outcome.folder) != folder.absolute():  # the folder was removed during the session
         folder = Path(outcome.folder)
