@@ -67,8 +67,8 @@ def shares(kind: Kind, people: int, true_r: float, studies: int, draw: np.random
         assert repeated.people is not None
         ends.append((*repeated.people, repeated.low, repeated.high))
     low, high, fisher_low, fisher_high = np.transpose(ends)
-    held, by_fisher = ((low <= true_r) & (true_r <= high)), (fisher_low <= true_r) & (true_r <= fisher_high)
-    return float(np.mean(held)), float(np.mean(true_r < low)), float(np.mean(by_fisher))
+    coverage, by_fisher = ((low <= true_r) & (true_r <= high)), (fisher_low <= true_r) & (true_r <= fisher_high)
+    return float(np.mean(coverage)), float(np.mean(true_r < low)), float(np.mean(by_fisher))
 
 
 def main() -> None:
@@ -85,7 +85,7 @@ def main() -> None:
         x, y = (values - values.mean(axis=1, keepdims=True) for values in study(kind, POPULATION, draw))
         true_r = float((x * y).sum() / np.sqrt((x * x).sum() * (y * y).sum()))
         rows = [shares(kind, people, true_r, options.count, draw) for people in PEOPLE]
-        cells = [f"{100 * held:.1f} % ({100 * below:.1f} %)" for held, below, _ in rows]
+        cells = [f"{100 * coverage:.1f} % ({100 * below:.1f} %)" for coverage, below, _ in rows]
         print(f"| {kind.__name__.replace('_', ' ')} | {' | '.join(cells)} | {100 * rows[-1][-1]:.1f} % |", flush=True)
 
 

@@ -192,10 +192,13 @@ _RESPONSES: Mapping[str, tuple[str, str]] = {
 
 def _columns(study: StudyFindings) -> Mapping[str, tuple[str, str]]:
     """Return unit and meaning of each column of `trials_csv`, by its name."""
-    simulated = {_SIMULATED: ("", "yes where transducer or subject were simulated")} if study.simulated else {}
     session_columns = {"session": ("", "folder of the session"), "subject": ("", "code of the subject")}
     excluded = {"excluded": ("", "why the trial is left out of every number of the study; empty where it counts")}
-    return {**simulated, **session_columns, **_MEANING, **_RESPONSES, **excluded}
+    return {**_simulated_column(study), **session_columns, **_MEANING, **_RESPONSES, **excluded}
+
+
+def _simulated_column(study: StudyFindings) -> Mapping[str, tuple[str, str]]:
+    return {_SIMULATED: ("", "yes where transducer or subject were simulated")} if study.simulated else {}
 
 
 def columns_csv(study: StudyFindings) -> str:
@@ -219,14 +222,14 @@ _RIVAL, _CONTRAST = meanings(Rival), meanings(Contrast)
 _RIVALS = _DESCRIPTOR | _KIND | _RIVAL | {column: _CONTRAST[name] for name, column in _CONTRAST_COLUMNS.items()}
 
 
-def path_columns_csv() -> str:
+def path_columns_csv(study: StudyFindings) -> str:
     """Return a row for each column of `paths_csv`, as `columns_csv`."""
-    return _columns_csv(_PATHS)
+    return _columns_csv({**_simulated_column(study), **_PATHS})
 
 
-def rival_columns_csv() -> str:
+def rival_columns_csv(study: StudyFindings) -> str:
     """Return a row for each column of `rivals_csv`, as `columns_csv`."""
-    return _columns_csv(_RIVALS)
+    return _columns_csv({**_simulated_column(study), **_RIVALS})
 
 
 def paths_csv(study: StudyFindings) -> str:

@@ -257,9 +257,9 @@ def _write(study: StudyFindings, name: str, files: Mapping[str, Path]) -> None:
         "columns": pages.columns_csv(study),
         "numbers": json_text(study.to_dict()),
         "rivals": pages.rivals_csv(study),
-        "rival_columns": pages.rival_columns_csv(),
+        "rival_columns": pages.rival_columns_csv(study),
         "paths": pages.paths_csv(study),
-        "path_columns": pages.path_columns_csv(),
+        "path_columns": pages.path_columns_csv(study),
     }
     for content, path in files.items():
         pages.swap_in(path, texts[content])
