@@ -20,7 +20,7 @@ _TITLE_WIDTH = 44  # characters in a line of a picture's title
 _WITHIN = " Within subjects n counts trials, and intervals and tests are by the jackknife over subjects."
 _AIC = (
     "AIC weight: a share among these quantities, of which none need be right, by mixed models with one slope between "
-    "surfaces and one within; on five surfaces the greatest claims too much. "
+    "surfaces and one within; on five surfaces the greatest is too large. "
 )
 
 RivalGroups = Sequence[tuple[str, Sequence[Rival]]]  # name of a group, and its rivals
