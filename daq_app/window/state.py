@@ -184,6 +184,8 @@ def fold(state: AppState, message: Message) -> AppState:
     """Return the state after a message: a request to the recorder, a report from it, or the window's own."""
     if type(message) in _FROM_RECORDER:
         state = replace(state, last_report=state.now)
+    if state.failure is not None and state.failure.request == type(message).__name__:  # it is tried again
+        state = replace(state, failure=None)
     bench = _fold_readings(_fold_link(state.bench, message), message)
     session = state.session and session_after(state.session, message, state.now)
     if bench is not state.bench or session is not state.session:

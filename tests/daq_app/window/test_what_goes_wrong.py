@@ -202,3 +202,9 @@ def test_no_key_stands_for_no_answer_while_an_answer_is_typed_in_digits():
     for question in (steps.AskNumber(PLAN.trials[0], "How sticky?"), steps.AskChoice(*PLAN.trials[:2], "Which?")):
         assert derive_view(after(*MOUNT, question)).course.buttons["no answer"].key == ""
     assert owner("0", "choice", typing=False) == "answer"  # beside 1 and 2 on a keypad
+
+
+def test_the_banner_of_a_request_that_failed_goes_when_it_is_made_again_and_not_with_another_one():
+    state = after(m.Failed("Connect", "nothing answers at 192.168.1.1", "LinkLost"))
+    assert derive_view(after(m.Tare(), state=state)).banner.sentence == "Nothing answers at 192.168.1.1."
+    assert derive_view(after(m.Connect("net-ft://10.0.0.9"), state=state)).banner is None
