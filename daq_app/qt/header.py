@@ -50,8 +50,13 @@ class Header(QWidget):
 
     def show_view(self, view: View) -> None:
         set_text(self._heading, view.heading)
-        lamp_text = view.bench.lamp_text.replace(" ", "\u00a0")  # a line may break only after the name
+        # A line may break only after the name: the parts below stay in place. The bench has the whole text.
+        lamp_text = view.bench.lamp_text.replace(" ", "\u00a0")
+        width = self._device.contentsRect().width()
+        lamp_text = self._device.fontMetrics().elidedText(lamp_text, Qt.TextElideMode.ElideRight, width)
         set_text(self._device, f"{view.bench.name}: {lamp_text}")
+        self._device.setAccessibleName(f"{view.bench.name}: {view.bench.lamp_text}")
+        self._device.setToolTip(self._device.accessibleName())
         set_text(self._language, name_of(view.subject.language), tr("language that the subject reads"))
         self._simulated.setVisible(view.simulated is not None)
         self._simulated.setToolTip(view.simulated or "")

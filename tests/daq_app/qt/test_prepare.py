@@ -74,6 +74,28 @@ def test_what_is_below_the_top_stays_in_place_while_the_transducer_says_more(dri
     assert {width: len(there) for width, there in places.items()} == dict.fromkeys(places, 1)
 
 
+def test_what_the_transducer_says_at_length_is_cut_with_an_ellipsis_and_kept_for_screen_readers(driver):
+    window, words = driver.window, "500 saturated, transducer saturated or converter error"
+    label = window.header._device
+    window.bridge.blockSignals(True)
+    try:
+        bench = replace(driver.view.bench, name="SIMULATED Net F/T SI-36-0.5", lamp_text=words)
+        for width in (1366, 1440):
+            window.resize(width, 900)
+            for _ in range(3):  # until the rows at the top have found their places
+                window.header.show_view(replace(driver.view, bench=bench, heading="subject P07 · sensotact-friction"))
+                driver.application.processEvents()
+            line = label.text().partition(": ")[2]
+            assert line.startswith("500\u00a0saturated,")
+            assert line.endswith("…")
+            assert label.fontMetrics().horizontalAdvance(line) <= label.width()
+            assert words in label.accessibleName()
+    finally:
+        window.bridge.blockSignals(False)
+        window.header.show_view(driver.view)
+        window.resize(1440, 900)
+
+
 def test_no_card_moves_while_a_code_is_typed_and_who_strokes_is_chosen(driver):
     page, places = driver.window.page, set()
 
