@@ -55,6 +55,17 @@ def test_every_member_of_a_class_that_a_page_names_is_there(page):
         assert not files or any(re.search(rf"\b{member}\b", text) for text in files), f"{name}.{member}"
 
 
+def test_a_name_that_a_page_places_in_a_file_is_defined_there():
+    missing = []
+    for page in [path for path in (ROOT / "docs").rglob("*.md") if "decisions" not in path.parts]:
+        for name, place in re.findall(r"`(\w+)`\s+\(`([\w/]+\.py)`\)", page.read_text(encoding="utf-8")):
+            files = [*ROOT.glob(place), *ROOT.glob(f"*/{place}")]
+            definition = re.compile(rf"^ *(?:(?:def|class) {name}\b|{name}\s*[:=])", re.MULTILINE)
+            if not any(definition.search(file.read_text(encoding="utf-8")) for file in files):
+                missing.append((page.name, name, place))
+    assert missing == []
+
+
 def test_every_number_of_a_study_has_a_meaning_in_the_reference(monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "docs")
     page = importlib.import_module("study_keys").page()
