@@ -42,6 +42,7 @@ def doubts(report: Report) -> tuple[str, ...]:
     return (
         _in_variant(report, Variant(other_strain, "computed", "depth"), f"At {other_strain} strain"),
         _by_place(report),
+        *_without_impossible(report),
         _in_variant(report, by_force, "Under the measured normal force in place of a given depth"),
         OTHER_FINGERS,
         *report.other_signs,
@@ -61,13 +62,34 @@ def _in_variant(report: Report, variant: Variant, condition: str) -> str:
         if experiment.name in tried:
             names[_scores(experiment)] = None
             fit = _relation(report, experiment, sed)
-            text = fit.reason if fit.pearson is None else f"r = {correlation(fit.pearson)}{ends_of(fit)}"
-            clauses.append(f"{experiment.name} {text}, n = {plural(fit.n, 'stimulus', 'stimuli')}")
+            clauses.append(f"{experiment.name} {_fit_in_short(fit)}")
     if not clauses:
         sizes = [fact.value for fact in report.left_out if condition.endswith(fact.name) and fact.value != NO_ESTIMATE]
         change = f": the change is estimated at {sizes[0]}" if sizes else ""
         return f"{condition}, which was not tried here, the sign of r may differ{change}."
     return f"{condition}, r of the SED with the {' and the '.join(names)}: {'; '.join(clauses)}."
+
+
+def _without_impossible(report: Report) -> list[str]:
+    """Return a sentence with r without stimuli in a state that no finger can be in, where there are some."""
+    quantity = shown_response(report.response)
+
+    def possible(prediction: PredictionFinding) -> float | None:
+        numbers = quantity.numbers(prediction)
+        return None if numbers is None or prediction.doubt else numbers[0]
+
+    fits = {
+        experiment.name: _relation(report, experiment, possible)
+        for experiment in report.experiments
+        if experiment.scores and any(p.doubt for p in report.predictions if p.experiment == experiment.name)
+    }
+    clauses = [f"{name} {_fit_in_short(fit)}" for name, fit in fits.items()]
+    return [f"Without trials in a state that no finger can be in: {'; '.join(clauses)}."] if clauses else []
+
+
+def _fit_in_short(fit: Relation) -> str:
+    text = fit.reason if fit.pearson is None else f"r = {correlation(fit.pearson)}{ends_of(fit)}"
+    return f"{text}, n = {plural(fit.n, 'stimulus', 'stimuli')}"
 
 
 def _scores(experiment: Experiment) -> str:

@@ -31,6 +31,7 @@ from sessions.statistics.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.multiverse import Kinematics
 from sessions.statistics.scores import by_key
 from sessions.statistics.visit import STILL_BLINDED, Exclusion, TrialRow, exclusion_of
+from sessions.statistics.within_subjects import RepeatedCorrelation
 from sessions.strokes.stroke import FIXED
 
 _MOST_NAMED = 12  # names listed in full
@@ -60,6 +61,7 @@ def summary(study: StudyFindings) -> list[str]:
         sentences += (
             [paths_sentence(findings.descriptor, findings.paths, findings.single_subject)] if findings.paths else []
         )
+    sentences += _different_settings(study)
     if any(findings.repeated is not None for findings in study.descriptors):
         sentences.append(
             "With the receptor elsewhere or under the measured force the sign may differ, too, as the report of each "
@@ -118,8 +120,27 @@ def _relation_sentences(findings: DescriptorFindings, study: StudyFindings) -> l
         f"r = {correlation(repeated.r)} over {plural(len(findings.points), 'trial')} of {people} on {surfaces}, "
         f"{interval}; "
         f"{_otherwise(findings, other_strain)}.",
+        *_subsets(findings),
         *([reversal_sentence(findings.descriptor, falling, len(findings.answers))] if falling else []),
     ]
+
+
+def _subsets(findings: DescriptorFindings) -> list[str]:
+    """Return sentences on r without trials that no finger can be in, and within blocks, where either differs."""
+    cases: list[tuple[str, RepeatedCorrelation | None]] = []
+    if findings.repeated_in_blocks is not None:
+        cases.append(("within each block of a subject", findings.repeated_in_blocks))
+    if findings.doubtful:
+        trials = plural(findings.doubtful, "trial")
+        cases.append((f"without {trials} in a state that no finger can be in", findings.repeated_possible))
+    return [f"{capital(findings.descriptor)}, {case}: {_r_in_short(repeated)}." for case, repeated in cases]
+
+
+def _r_in_short(repeated: RepeatedCorrelation | None) -> str:
+    if repeated is None:
+        return "too few trials for a correlation, or no variation"
+    low_to_high = "no interval" if repeated.people is None else " to ".join(map(correlation, repeated.people))
+    return f"r = {correlation(repeated.r)} ({low_to_high})"
 
 
 def _otherwise(findings: DescriptorFindings, other_strain: Kinematics) -> str:
@@ -212,7 +233,7 @@ def remarks(study: StudyFindings) -> list[str]:
         "used backwards, or these scores may follow no order."
         for subject, descriptor, r in study.reversed
     ]
-    return [*sentences, *_doubtful_trials(study), *_different_settings(study), *_meshes(study)]
+    return [*sentences, *_doubtful_trials(study), *_meshes(study)]
 
 
 # What sets a prediction besides a stroke's friction, and its text

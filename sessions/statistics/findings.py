@@ -99,7 +99,9 @@ class DescriptorFindings:
     points: tuple[tuple[str, int, float, float], ...]  # subject, index, response to its own stroke [MPa or -], score
     mean_relation: Relation | None  # mean response against mean score
     repeated: RepeatedCorrelation | None  # of a subject's scores with the responses to its own strokes
-    repeated_holm: float | None  # its p, adjusted for the number of descriptors
+    repeated_possible: RepeatedCorrelation | None  # the same without trials in a state that no finger can be in
+    repeated_in_blocks: RepeatedCorrelation | None  # the same within each block; None where no subject has several
+    repeated_holm: float | None  # p of `repeated`, adjusted for the number of descriptors
     rivals: tuple[Rival, ...]  # within subjects: the response and its rivals
     rivals_of_means: tuple[Rival, ...]  # the same for means over subjects
     without_subject: tuple[tuple[str, float], ...]  # subject left out, r within the other subjects
@@ -115,6 +117,7 @@ class DescriptorFindings:
     on_friction: MixedModel | str  # score on the index and on the µ of each subject's own stroke, drift and carry-over
     fingers: Spread | None  # spread of the logarithm of mu between subjects, without surface effects [-]
     paths: tuple[PathFinding, ...]  # () where not requested
+    doubtful: int = 0  # trials with a score and a response, in a state that no finger can be in
     constant_stimuli: ConstantStimuli | None = None  # None without such comparisons
     # By kind of judgement and index, with mean 0, in standard deviations of the difference of two judgements
     latent: Mapping[Judgement, Mapping[int, IntervalEstimate]] = field(

@@ -109,6 +109,7 @@ def _descriptor(
     score_rows = [(subject, row, score) for subject, row, _, score in rows if score is not None]
     points = [(subject, row, x, score) for subject, row, x, score in rows if x is not None and score is not None]
     number_points = tuple((subject, row.index, x, score) for subject, row, x, score in points)
+    possible = [(subject, row.index, x, score) for subject, row, x, score in points if not row.doubt]
     pairs = choices(trials)
     paired = tuple(scales.paired_scale(pairs, model) for model in scales.MODELS) if pairs else ()
     comparisons = constant_stimuli(trials)
@@ -126,6 +127,8 @@ def _descriptor(
         points=number_points,
         mean_relation=_relation(number_points),
         repeated=_correlation_within(number_points),
+        repeated_possible=_correlation_within(possible),
+        repeated_in_blocks=_within_blocks(points),
         repeated_holm=None,
         rivals=rivals_within(rival_trials, quantity.label),
         rivals_of_means=rivals_of_surfaces(rival_trials, quantity.label),
@@ -148,6 +151,7 @@ def _descriptor(
             options.area,
             within=True,
         ),
+        doubtful=len(points) - len(possible),
         constant_stimuli=comparisons,
         latent=latent_scales(trials, paired, comparisons),
     )
@@ -223,10 +227,19 @@ def _relation(points: Points) -> Relation | None:
     return relation(list(responses.values()), list(scores.values()), list(responses))
 
 
-def _correlation_within(points: Points) -> within_subjects.RepeatedCorrelation | None:
+def _correlation_within(points: Sequence[tuple[str, int, float, float]]) -> within_subjects.RepeatedCorrelation | None:
     """Return the correlation of scores with responses within subjects."""
     subjects, _, responses, scores = zip(*points, strict=True) if points else ((), (), (), ())
     return within_subjects.repeated_correlation(subjects, responses, scores)
+
+
+def _within_blocks(points: Sequence[tuple[str, TrialRow, float, float]]) -> within_subjects.RepeatedCorrelation | None:
+    """Return the correlation within the blocks of each subject; None where each has a single one."""
+    blocks = {(subject, row.block) for subject, row, _, _ in points}
+    if len(blocks) == len({subject for subject, _ in blocks}):
+        return None
+    subjects, rows, responses, scores = zip(*points, strict=True)
+    return within_subjects.repeated_correlation(subjects, responses, scores, [row.block for row in rows])
 
 
 def _without_subject(points: Points) -> tuple[tuple[str, float], ...]:

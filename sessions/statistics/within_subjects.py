@@ -34,8 +34,8 @@ class RepeatedCorrelation:
     low: float  # 95 % interval by Fisher's z, for `dof` degrees of freedom: for independent pairs
     high: float  # its upper end
     p: float  # two-sided, for independent pairs
-    dof: int  # N - k - 1 for N pairs from k subjects
-    subjects: int  # with at least two pairs: a single pair has no variation within its subject
+    dof: int  # N - k - 1 for N pairs from k subjects, or k blocks of subjects
+    subjects: int  # with at least two pairs: a single pair has no variation within its subject or block
     people: tuple[float, float] | None  # 95 % interval for other such subjects who meet the same stimuli
     people_p: float | None  # two-sided, as for `people`; both None for two or identical subjects, and for r = ±1
 
@@ -78,26 +78,32 @@ def within_means(table: Table) -> tuple[WithinMean, ...]:
     )
 
 
-def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequence[float]) -> RepeatedCorrelation | None:
+def repeated_correlation(
+    subjects: Sequence[str], x: Sequence[float], y: Sequence[float], blocks: Sequence[str] | None = None
+) -> RepeatedCorrelation | None:
     """Return the repeated-measures correlation of pairs (N), each with its subject; None where it has no value.
 
-    It is the correlation of x and y after subtracting each subject's means, tested with N - k - 1 degrees of freedom
+    It is the correlation of x and y after subtracting each subject's means, or with `blocks` (N) those of each subject
+    in each block, tested with N - k - 1 degrees of freedom for k means
     (Bland & Altman 1995; Bakdash & Marusich 2017, Front. Psychol. 8:456). That interval assumes independent pairs.
     Subjects who all meet the same stimuli share the nonlinearity of y in x, which is not random: `people` leaves out
     each subject with at least two pairs in turn (Tukey's jackknife of Fisher's z, t with one degree of freedom fewer
     than such subjects: Miller 1974, Biometrika 61:1). Neither holds for other stimuli, where these are few and shared.
     """
     codes = np.unique(np.array(subjects), return_inverse=True)[1]
-    dof = len(codes) - (int(codes.max()) + 1 if len(codes) else 0) - 1
+    pairs = list(zip(subjects, blocks or [""] * len(codes), strict=True))
+    numbers = {pair: number for number, pair in enumerate(dict.fromkeys(pairs))}
+    levels = np.array([numbers[pair] for pair in pairs], np.int64)
+    dof = len(codes) - len(numbers) - 1
     if dof < 2:
         return None
     columns = (np.array(values, np.float64) for values in (x, y))
-    left_x, left_y = (column - (np.bincount(codes, column) / np.bincount(codes))[codes] for column in columns)
+    left_x, left_y = (column - (np.bincount(levels, column) / np.bincount(levels))[levels] for column in columns)
     size = math.sqrt(float(left_x @ left_x) * float(left_y @ left_y))
     if size <= 1e-12 * float(np.abs(x).max()) * float(np.abs(y).max()):
         return None
     r = float(np.clip(left_x @ left_y / size, -1.0, 1.0))
-    has_pairs = np.bincount(codes) > 1
+    has_pairs = np.bincount(codes) > np.bincount(codes[np.unique(levels, return_index=True)[1]])
     count = int(has_pairs.sum())
     if 1.0 - abs(r) < 1e-12:
         return RepeatedCorrelation(r, r, r, 0.0, dof, count, None, None)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from report_example import example, experiments_of, tables
 from study_example import visit
@@ -81,11 +82,11 @@ def pressed(number, depth, **changes):
 
 def test_sessions_pooled_with_unlike_settings_are_named_with_what_differs():
     study = pool_visits([pressed(1, 2.0), pressed(2, 2.0), pressed(3, 1.5)])
-    (sentence,) = [text for text in remarks(study) if "different settings" in text]
+    (sentence,) = [text for text in summary(study) if "different settings" in text]
     assert "depth of the model (2 mm: S01, S02; 1.5 mm: S03)" in sentence
     assert "area" not in sentence
     unlike = pool_visits([pressed(1, 2.0), pressed(2, 2.0, contact_area=80.0, direction=-1)])
-    (sentence,) = [text for text in remarks(unlike) if "different settings" in text]
+    (sentence,) = [text for text in summary(unlike) if "different settings" in text]
     assert "contact area (100 mm²: S01; 80 mm²: S02)" in sentence
     assert "direction (proximal to distal: S01; distal to proximal: S02)" in sentence
 
@@ -94,7 +95,7 @@ def test_like_settings_and_sessions_left_out_get_no_remark():
     left_out = (Exclusion("S03", "pressed less deeply", "E01"),)
     alike = pool_visits([pressed(1, 2.0), pressed(2, 2.0)])
     for study in (alike, pool_visits([pressed(1, 2.0), pressed(3, 1.5)], exclusions=left_out)):
-        assert not [text for text in remarks(study) if "different settings" in text]
+        assert not [text for text in summary(study) if "different settings" in text]
 
 
 def test_trials_in_a_state_that_no_finger_can_be_in_are_counted_and_named():
@@ -113,7 +114,7 @@ def test_trials_in_a_state_that_no_finger_can_be_in_are_counted_and_named():
 def test_two_depths_within_each_session_are_named_too():
     mixed = [(replace(v.rows[0], indentation=1.5), *v.rows[1:]) for v in (pressed(1, 2.0), pressed(2, 2.0))]
     study = pool_visits([replace(visit(number), rows=rows) for number, rows in enumerate(mixed, 1)])
-    (sentence,) = [text for text in remarks(study) if "different settings" in text]
+    (sentence,) = [text for text in summary(study) if "different settings" in text]
     assert "different settings: depth of the model (1.5 mm and 2 mm in each session)." in sentence
 
 
@@ -123,6 +124,53 @@ def test_an_interval_of_r_in_short_comes_with_its_assumption():
     stickiness, _ = experiments_of(tables(1))
     none = replace(stickiness.score_relation, low=None, high=None, reason="no interval of r from 3 points")
     assert assumption not in prose.summary(example(experiments=(replace(stickiness, score_relation=none),)))
+
+
+def deep_block(v, *, doubt=""):
+    """Return a visit whose surfaces come again in a block of twice the SED, judged alike."""
+    again = [replace(row, block="deep", trial=row.trial + 5, sed=2.0 * row.sed, doubt=doubt) for row in v.rows]
+    return replace(v, rows=(*v.rows, *again))
+
+
+def test_blocks_of_other_depths_do_not_hide_how_scores_follow_within_each():
+    plain = [visit(number) for number in range(1, 6)]
+    (findings,) = pool_visits([deep_block(v) for v in plain]).descriptors
+    rows = [(v.subject, row.block, row.sed, row.score) for v in map(deep_block, plain) for row in v.rows]
+    names, blocks, *columns = zip(*rows, strict=True)
+    groups = [f"{name} {block}" for name, block in zip(names, blocks, strict=True)]
+    x, y = (np.array(c) - [np.mean(np.array(c)[np.array(groups) == g]) for g in groups] for c in columns)
+    in_blocks = findings.repeated_in_blocks
+    assert in_blocks.r == pytest.approx(x @ y / np.sqrt(x @ x * (y @ y)))
+    assert (in_blocks.dof, in_blocks.subjects) == (50 - 10 - 1, 5)
+    assert findings.repeated.r < 0.3 < 0.9 < in_blocks.people[0] < in_blocks.r
+    text = " ".join(summary(pool_visits([deep_block(v) for v in plain])))
+    assert f"Stickiness, within each block of a subject: r = +{in_blocks.r:.2f} (" in text
+    assert pool_visits(plain).descriptors[0].repeated_in_blocks is None
+    assert "within each block" not in " ".join(summary(pool_visits(plain)))
+
+
+def test_a_study_says_what_r_is_without_states_that_no_finger_can_be_in():
+    plain = [visit(number) for number in range(1, 6)]
+    study = pool_visits([deep_block(v, doubt="Tissue is turned inside out.") for v in plain])
+    (findings,), (alone,) = study.descriptors, pool_visits(plain).descriptors
+    assert findings.repeated_possible == alone.repeated
+    assert findings.doubtful == 25
+    sentence = f"Stickiness, without 25 trials in a state that no finger can be in: r = +{alone.repeated.r:.2f} ("
+    assert sentence in " ".join(summary(study))
+    assert "no finger can be in" not in " ".join(summary(pool_visits(plain)))
+
+
+def test_a_session_says_what_r_is_without_states_that_no_finger_can_be_in():
+    report = example()
+    predictions = [replace(p, doubt="inside out") if p.index == 100 else p for p in report.predictions]
+    (stickiness, _) = report.experiments
+    means = {mean.index: mean.mean for mean in stickiness.scores}
+    possible = [p for p in report.predictions if p.experiment == "stickiness" and p.index != 100]
+    r = np.corrcoef([p.sed for p in possible], [means[p.index] for p in possible])[0, 1]
+    sentence = next(s for s in prose.doubts(replace(report, predictions=tuple(predictions))) if "no finger" in s)
+    assert sentence.startswith(f"Without trials in a state that no finger can be in: stickiness r = +{r:.2f}")
+    assert "n = 4 stimuli; slipperiness r = " in sentence
+    assert not [text for text in prose.doubts(report) if "no finger" in text]
 
 
 def test_without_a_correlation_nothing_would_change_its_sign():

@@ -222,6 +222,8 @@ def _relation(study: StudyFindings) -> Table | None:
             *_of_means("means", findings.mean_relation),
             *_of_means("means, standardised", findings.normalised.mean_relation),
             *_within_subjects("within subjects", findings.repeated, findings.repeated_holm, findings.without_subject),
+            *_within_subjects("within each block", findings.repeated_in_blocks),
+            *_within_subjects("within, possible states", findings.repeated_possible if findings.doubtful else None),
             *_within_subjects("within, standardised", findings.normalised.repeated),
             *_within_subjects("within, log estimates", of_estimates),
         )
