@@ -101,13 +101,17 @@ def check_design(design: Mapping[str, Any], scene: Scene, file: str) -> dict[str
     return ranges
 
 
+def _sed_of(scene: Scene) -> float:
+    return solve(replace(scene, solve=replace(scene.solve, course="steady", evidence="quick"))).sed_ending
+
+
 def sensitivity(
     scene: Scene,
     design: Design,
     samples: int,
     seed: int,
     progress: Callable[[float], None],
-    sed: Callable[[Scene], float] | None = None,
+    sed: Callable[[Scene], float] = _sed_of,
 ) -> tuple[tuple[Index, ...], Array]:
     """Return the index of each number, greatest total first, and the SEDs (samples * (numbers + 2),) [MPa].
 
@@ -115,13 +119,12 @@ def sensitivity(
     scene of the design has no answer, SceneError if a range exceeds the limits of a scene.
     """
     points = saltelli_points(design, samples, seed)
-    answer = sed or _sed_of
     scenes = [with_values(scene, dict(zip(design, point, strict=True))) for point in points.tolist()]
     responses = np.empty(len(points))
     failures: list[str] = []
     for i, sample in enumerate(scenes):
         try:
-            responses[i] = answer(sample)
+            responses[i] = sed(sample)
         except SolveFailure as failure:
             failures.append(" ".join(str(failure).split()))
         progress((i + 1) / len(points))
@@ -189,10 +192,6 @@ def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
     for name, inside in branches.items():
         changes[name] = with_values(getattr(scene, name), inside)
     return replace(scene, **changes)
-
-
-def _sed_of(scene: Scene) -> float:
-    return solve(replace(scene, solve=replace(scene.solve, course="steady", evidence="quick"))).sed_ending
 
 
 def _value(scene: Scene, name: str) -> float | None:

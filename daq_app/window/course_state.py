@@ -85,13 +85,12 @@ class TrialState:
     quality: Quality | None = None
     discard_reason: str = ""  # why its previous take was discarded; empty: none was
     has_stimulus: bool = True  # False: later answers choose its stimulus
+    earlier: tuple["TrialState", ...] = ()  # its state when each of its takes was discarded
 
     @property
     def code(self) -> str:
         """Return the label of its stimulus, or an ellipsis if that is not chosen yet."""
         return self.trial.stimulus.code if self.has_stimulus else "…"
-
-    earlier: tuple["TrialState", ...] = ()  # its state when each of its takes was discarded
 
 
 @dataclass(frozen=True, slots=True)
