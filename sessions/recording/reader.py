@@ -6,7 +6,7 @@ import sqlite3
 import tempfile
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -177,7 +177,7 @@ class Recording:
             inside = block.received_ns >= start_ns
             if stop_ns is not None:
                 inside &= block.received_ns < stop_ns
-            blocks.append(ReadingBlock(**{field.name: getattr(block, field.name)[inside] for field in fields(block)}))
+            blocks.append(block.where(inside))
         return ReadingBlock.concatenate(blocks)
 
     def last_block(self) -> ReadingBlock:
