@@ -11,7 +11,7 @@ from daq_app.qt import start
 
 
 def write(folder: Path) -> None:
-    """Write every generated page into `folder`."""
+    """Write every generated page into `folder`, and remove all others."""
     folder.mkdir(parents=True, exist_ok=True)
     pages = {
         "command-line": command_line(),
@@ -20,6 +20,9 @@ def write(folder: Path) -> None:
         "study-keys": study_keys.page(),
     }
     looks.write_pictures(folder)
+    for file in folder.glob("*.md"):  # a page of an earlier version is in no table of contents
+        if file.stem not in pages:
+            file.unlink()
     for name, text in pages.items():
         file = folder / f"{name}.md"
         if not file.exists() or file.read_text(encoding="utf-8") != text:
