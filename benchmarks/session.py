@@ -3,7 +3,8 @@
 import argparse
 import tempfile
 import time
-from collections.abc import Callable
+from functools import partial
+from math import inf
 from pathlib import Path
 from statistics import median
 
@@ -15,6 +16,7 @@ from sessions.recording.schema import RecordingError
 from sessions.run.replay import different_events, different_readings, replay
 from sessions.strokes import analyse
 from sessions.strokes.bootstrap import stroke_intervals
+from solver.verification.request import median_time
 
 RUNS = 9
 WORDS = ("run", "sensotact-friction", "--device", "sim:?seed=7&rate=200", "--subject", "P01", "--headless")
@@ -67,11 +69,12 @@ def _print_analysis(recording: Recording) -> None:
     prediction = predict(analysis, recording.plan, options)
     with_spans = with_intervals(prediction)
     with_alternatives(with_spans)
-    alone = _median_time(lambda: analyse(Recording.open(recording.folder)))
-    bootstrap = _median_time(lambda: [stroke_intervals(stroke, index) for index, stroke in enumerate(strokes)])
-    solves = _median_time(lambda: predict(analysis, recording.plan, prediction.options))
-    spans = _median_time(lambda: with_intervals(prediction))
-    alternatives = _median_time(lambda: with_alternatives(with_spans))
+    time_of = partial(median_time, repeats=RUNS, most_s=inf)
+    alone = time_of(lambda: analyse(Recording.open(recording.folder)))
+    bootstrap = time_of(lambda: [stroke_intervals(stroke, index) for index, stroke in enumerate(strokes)])
+    solves = time_of(lambda: predict(analysis, recording.plan, prediction.options))
+    spans = time_of(lambda: with_intervals(prediction))
+    alternatives = time_of(lambda: with_alternatives(with_spans))
     print(f"{len(strokes)} strokes, medians of {RUNS}, processor time")
     print(f"opened and analysed   {1000 * alone:6.0f} ms   (reach 1000)")
     print(f"bootstrap intervals   {1000 * bootstrap:6.0f} ms   (both together: reach 5000)")
@@ -81,16 +84,6 @@ def _print_analysis(recording: Recording) -> None:
     print(f"predicted both ways   {1000 * solves:6.0f} ms   at small strain")
     print(f"intervals of the SEDs {1000 * spans:6.0f} ms   {len(intervals)} of them, {samplings} by sampling")
     print(f"side by side          {1000 * alternatives:6.0f} ms   at small strain")
-
-
-def _median_time(work: Callable[[], object]) -> float:
-    """Return the median processor time of `work` [s]."""
-    times: list[float] = []
-    for _ in range(RUNS):
-        start = time.process_time()
-        work()
-        times.append(time.process_time() - start)
-    return median(times)
 
 
 if __name__ == "__main__":
