@@ -2,6 +2,7 @@
 
 import sys
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
@@ -26,6 +27,7 @@ _HELP = (
 )
 PAUSED = "The session is paused. Type resume to continue."
 KEYBOARD = "keyboard"
+PERCEPTION = 0.4  # a person's Enter that comes sooner after a question was meant for the one before [s]
 _CHOICES: dict[float | None, Literal["first", "second"] | None] = {1.0: "first", 2.0: "second", None: None}
 _WAYS = {1: "from proximal to distal (away from the subject)", -1: "from distal to proximal (towards the subject)"}
 
@@ -47,17 +49,19 @@ class Terminal:
         self._forces = forces
         self._print = console.note
         self._prompt: Prompt | None = None
+        self._asked_at = 0.0  # when the prompt was shown [s]
         self._paused = False
-        self._lines: deque[str] = deque()
+        self._source = lines or sys.stdin
+        self._lines: deque[tuple[float, str]] = deque()  # with the time [s] at which each came
         self.closed = False  # stdin has ended
         # A daemon: a blocked read of stdin must not keep the program alive.
-        threading.Thread(target=self._read, args=(lines or sys.stdin,), daemon=True).start()
+        threading.Thread(target=self._read, daemon=True).start()
         self._print(_HELP)
 
     def show(self, command: steps.Command) -> None:
         """Print the instruction of a command, and remember its question."""
         if (prompt := self._prompt_of(command)) is not None:
-            self._prompt = prompt
+            self._prompt, self._asked_at = prompt, time.monotonic()
             self._print(prompt.question)
             return
         match command:
@@ -108,10 +112,10 @@ class Terminal:
 
     def poll(self) -> tuple[steps.Event, ...]:
         """Return the events of the lines typed since the last call."""
-        events = [self._parse(self._lines.popleft().strip()) for _ in range(len(self._lines))]
+        events = [self._parse(*self._lines.popleft()) for _ in range(len(self._lines))]
         return tuple(event for event in events if event is not None)
 
-    def _parse(self, line: str) -> steps.Event | None:
+    def _parse(self, arrival: float, line: str) -> steps.Event | None:
         word, _, text = line.partition(" ")
         orders: dict[str, steps.Event] = {
             "redo": steps.Redo(text), "skip": steps.Skip(text), "abort": steps.Abort(text), "note": steps.Note(text),
@@ -122,21 +126,23 @@ class Terminal:
             return None
         if word in orders:
             return orders[word]
-        event, number = None, typed_number(line)
+        event, number, early = None, typed_number(line), False
         if self._prompt is not None and line == "":
-            event = None if self._paused else self._prompt.enter
+            early = arrival < self._asked_at + PERCEPTION and self._source.isatty()  # a script need not read
+            event = None if self._paused or early else self._prompt.enter
         elif self._prompt is not None and (number is not None or line == "-"):
             event = self._prompt.answer(number)
         if event is None:
             due = PAUSED if self._paused else _HELP if self._prompt is None else self._prompt.question
-            nothing = f"'{line}' is not valid now" if line else "Nothing is waiting for Enter now"
+            why = "That Enter came too soon after this was asked" if early else "Nothing is waiting for Enter now"
+            nothing = f"'{line}' is not valid now" if line else why
             doubt = ": it is {} or {}".format(*meanings) if (meanings := two_meanings(line)) else ""
             self._print(f"{nothing}{doubt}. {due}")
         return event
 
-    def _read(self, lines: TextIO) -> None:
-        for line in lines:
-            self._lines.append(line)
+    def _read(self) -> None:
+        for line in self._source:
+            self._lines.append((time.monotonic(), line.strip()))
         self.closed = True
 
 

@@ -9,12 +9,13 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from desk import Desk
 
 from daq_app.cli.main import run
-from daq_app.cli.terminal import Terminal
+from daq_app.cli.terminal import PERCEPTION, Terminal
 from daq_app.console import Console, accept_any_text
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import SessionBegun, SessionEnded
@@ -233,3 +234,25 @@ def test_a_script_gets_a_document_of_a_session_whose_recorder_is_killed_at_its_b
         assert error["kind"] == "recorder"
         assert f"with 'daq-app resume {folder}'" in error["message"]
         assert f"daq-app: {error['message']}" in output.err
+
+
+def test_an_enter_of_a_person_that_came_before_the_question_could_be_read_does_not_confirm_it(monkeypatch):
+    """As when a rest ends by itself just as Enter is pressed to end it."""
+
+    class Keys(io.StringIO):
+        def isatty(self):
+            return True
+
+    events = []
+    for wait in (0.0, 2.0 * PERCEPTION):
+        now = time.monotonic()
+        monkeypatch.setattr("daq_app.cli.terminal.time", SimpleNamespace(monotonic=lambda now=now: now))
+        out = io.StringIO()
+        terminal = Terminal(Console(as_json=False, err=out), forces=True, lines=Keys())
+        terminal.show(steps.AskMount(TRIAL))
+        terminal._lines.append((now + wait, ""))
+        events += terminal.poll()
+        question = f"Trial 1: mount {TRIAL.stimulus.code}, then press Enter.\n"
+        repetition = f"That Enter came too soon after this was asked. {question}"
+        assert out.getvalue().endswith(question if wait else f"{question}{repetition}")
+    assert events == [steps.StimulusMounted(TRIAL.stimulus.code)]
