@@ -57,6 +57,13 @@ class Columns:
         identified = {self.time, *self.axes}
         return tuple(name for position, name in enumerate(self.names) if position not in identified)
 
+    @property
+    def renamed(self) -> tuple[str, ...]:
+        """What --axes reads otherwise than the header names it, such as "Fz_N as Fy"."""
+        identified = zip((TIME, *AXES), (self.time, *self.axes), strict=True)
+        headed = [(axis, self.names[position]) for axis, position in identified if position is not None]
+        return tuple(f"{name} as {axis}" for axis, name in headed if _heading(name)[0] not in (axis, SKIPPED))
+
 
 def columns(
     header: Sequence[str] | None, axes: Sequence[str] | None, units: tuple[str, str] | None, width: int
@@ -180,6 +187,7 @@ class ImportResult:
     rate: float  # readings a second [Hz]
     defaults: tuple[str, ...]  # values nobody stated, a sentence each
     extra: tuple[str, ...]  # columns kept only in the original file
+    renamed: tuple[str, ...] = ()  # columns read as another axis than their heading names
 
 
 def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -> ImportResult:
@@ -212,6 +220,7 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
         "kept_as": ORIGINAL_FILE,
         "columns": list(layout.names),
         "extra_columns": list(layout.extra),
+        "renamed_columns": list(layout.renamed),
         "first_time_s": float(rows[0, layout.time]) * TIME_UNITS[layout.time_unit] if layout.time is not None else None,
     }
     frame = Frame().with_values(options.normal, options.height)
@@ -228,7 +237,7 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
     writer.readings(block)
     writer.event("ended", data={"reason": "the file ends", "cause": "finished", "readings": len(block)})
     writer.close()
-    return ImportResult(folder, len(block), rate, _defaults(frame), layout.extra)
+    return ImportResult(folder, len(block), rate, _defaults(frame), layout.extra, layout.renamed)
 
 
 def _table(path: Path, content: bytes, options: ImportOptions) -> tuple[Columns, Array, list[int]]:

@@ -72,6 +72,17 @@ def test_the_file_itself_is_kept_with_its_hash(tmp_path):
     assert result.extra == ("x_m", "hand")
 
 
+def test_a_column_that_axes_read_against_its_heading_is_named(tmp_path):
+    header = HEADER.replace("Fy_", "F?_").replace("Fz_", "Fy_").replace("F?_", "Fz_")
+    options = ImportOptions(axes=tuple(BARE.split(",")))
+    result, recording = import_file(tmp_path, header=header, options=options)
+    assert result.renamed == ("Fz_N as Fy", "Fy_N as Fz")
+    assert recording.provenance["imported"]["renamed_columns"] == ["Fz_N as Fy", "Fy_N as Fz"]
+    (tmp_path / "plain").mkdir()
+    result, _ = import_file(tmp_path / "plain", options=options)
+    assert result.renamed == ()
+
+
 def test_times_count_from_the_first_reading_and_the_first_is_remembered(tmp_path):
     _, recording = import_file(tmp_path, rows=[f"{100 + i / 50:.2f},0,0,{i},0,0,0" for i in range(10)])
     assert recording.readings().time.tolist() == pytest.approx([i / 50 for i in range(10)])

@@ -103,6 +103,7 @@ def _import_foreign(folder: Path, options: argparse.Namespace, console: Console)
         f"{summary.folder}: {summary.readings} readings at {number(summary.rate, 4)} per second",
         *(f"default: {default}" for default in summary.defaults),
         f"kept only in the original file: {', '.join(summary.extra)}" if summary.extra else None,
+        f"against the header, by --axes: {', '.join(summary.renamed)}" if summary.renamed else None,
     )
     return DONE
 
