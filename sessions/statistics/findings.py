@@ -97,6 +97,7 @@ class DescriptorFindings:
     surfaces: tuple[SurfaceMean, ...]
     answers: Mapping[str, tuple[float | None, ...]]  # subject -> score of each index [points]
     points: tuple[tuple[str, int, float, float], ...]  # subject, index, response to its own stroke [MPa or -], score
+    point_blocks: tuple[str, ...]  # name of the block of each of `points`
     mean_relation: Relation | None  # mean response against mean score
     repeated: RepeatedCorrelation | None  # of a subject's scores with the responses to its own strokes
     repeated_possible: RepeatedCorrelation | None  # the same without trials in a state that no finger can be in

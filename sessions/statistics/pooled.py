@@ -125,6 +125,7 @@ def _descriptor(
         surfaces=tuple(_surface(index, quantity.name, by_index[index]) for index in indices),
         answers={subject: tuple(row.get(index) for index in indices) for subject, row in matrix.items()},
         points=number_points,
+        point_blocks=tuple(row.block for _, row, _, _ in points),
         mean_relation=_relation(number_points),
         repeated=_correlation_within(number_points),
         repeated_possible=_correlation_within(possible),

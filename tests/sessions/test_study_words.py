@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from report_example import example, experiments_of, tables
 from study_example import visit
 
 from sessions.report import prose
+from sessions.report.figures.relation import study_plates
 from sessions.report.pages import study_page
 from sessions.report.study_prose import distinctions, remarks, summary
 from sessions.report.tables.study import study_tables
@@ -147,6 +149,14 @@ def test_blocks_of_other_depths_do_not_hide_how_scores_follow_within_each():
     assert f"Stickiness, within each block of a subject: r = +{in_blocks.r:.2f} (" in text
     assert pool_visits(plain).descriptors[0].repeated_in_blocks is None
     assert "within each block" not in " ".join(summary(pool_visits(plain)))
+
+
+def test_no_line_of_the_picture_leads_from_one_block_to_another(monkeypatch):
+    lines = []
+    monkeypatch.setattr(Axes, "plot", lambda _, *line, **__: lines.append(line) if "-" in line else None)
+    panel = next(p for plate in study_plates(pool_visits([deep_block(visit(1)), visit(2)])) for p in plate.panels)
+    assert panel.name == "study-relation-stickiness"
+    assert [len(x) for x, _, mark in lines if mark == "-"] == [5, 5, 5]
 
 
 def test_a_study_says_what_r_is_without_states_that_no_finger_can_be_in():

@@ -89,8 +89,11 @@ def _relation(findings: DescriptorFindings, quantity: ShownResponse) -> Panel:
     picture = sheet(328, 280)
     (axes,) = picture.axes
     separate = len(findings.points) <= _MOST_HOVERING  # with more points hovering shows only the subject
-    by_subject = by_key((subject, (quantity.factor * value, y, index)) for subject, index, value, y in findings.points)
-    for subject, points in by_subject.items():
+    by_line = by_key(
+        ((subject, block), (quantity.factor * value, y, index))
+        for (subject, index, value, y), block in zip(findings.points, findings.point_blocks, strict=True)
+    )
+    for (subject, _), points in by_line.items():
         dots = [x for x, _, _ in sorted(points)], [y for _, y, _ in sorted(points)]
         axes.plot(*dots, "-", color=GREY, alpha=0.35, linewidth=0.7)
         for x, y, index in sorted(points) if separate else ():
