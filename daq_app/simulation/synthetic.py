@@ -93,7 +93,7 @@ def recordings_in(folder: Path) -> Generator[None]:
     except KeyboardInterrupt:
         if not holds_something(folder):
             raise
-        raise RecordingKept(f"stopped; what was recorded is in {folder}", "stopped", session=str(folder)) from None
+        raise RecordingKept(f"stopped; what was recorded is in {folder}", "stopped", folder=str(folder)) from None
 
 
 class StudyCutShort(Exception):
