@@ -12,6 +12,7 @@ from sessions.report import prose
 from sessions.report.figures.relation import study_plates
 from sessions.report.pages import study_page
 from sessions.report.study_prose import distinctions, remarks, summary
+from sessions.report.tables.session import answer_tables
 from sessions.report.tables.study import study_tables
 from sessions.statistics.pooled import pool_visits
 from sessions.statistics.scores import Score, ScoreTable
@@ -126,6 +127,13 @@ def test_an_interval_of_r_in_short_comes_with_its_assumption():
     stickiness, _ = experiments_of(tables(1))
     none = replace(stickiness.score_relation, low=None, high=None, reason="no interval of r from 3 points")
     assert assumption not in prose.summary(example(experiments=(replace(stickiness, score_relation=none),)))
+
+
+def test_tables_of_answers_name_their_blocks():
+    (stickiness, _) = experiments_of(tables(2))
+    blocks = (stickiness, replace(stickiness, name="back"))
+    captions = [table.caption for table in answer_tables(example(experiments=blocks))]
+    assert [caption.partition(" [")[0] for caption in captions] == ["Every score of stickiness", "Every score of back"]
 
 
 def deep_block(v, *, doubt=""):

@@ -192,8 +192,8 @@ def answer_tables(report: Report) -> tuple[Table | None, ...]:
         answers = experiment.answers.items()
         rows = [(subject, *(number_cell(s, places(1), "no score") for s in scores)) for subject, scores in answers]
         columns = " | ".join(["subject", *(f"index {index}" for index in experiment.indices)])
-        name, descriptor = f"table-answers-{identifier(experiment.name)}", experiment.descriptor
-        tables.append(table(name, "session-answers", columns, [("", rows)], descriptor=descriptor))
+        name = f"table-answers-{identifier(experiment.name)}"
+        tables.append(table(name, "session-answers", columns, [("", rows)], block=experiment.name))
     return tuple(tables)
 
 
