@@ -9,7 +9,7 @@ from report_example import example, experiments_of, tables
 from study_example import visit
 
 from sessions.report import prose
-from sessions.report.figures.relation import study_plates
+from sessions.report.figures.relation import relation_panel, study_plates
 from sessions.report.pages import study_page
 from sessions.report.study_prose import distinctions, remarks, summary
 from sessions.report.tables.session import answer_tables
@@ -129,11 +129,13 @@ def test_an_interval_of_r_in_short_comes_with_its_assumption():
     assert assumption not in prose.summary(example(experiments=(replace(stickiness, score_relation=none),)))
 
 
-def test_tables_of_answers_name_their_blocks():
+def test_tables_of_answers_and_pictures_of_the_relation_name_their_blocks():
     (stickiness, _) = experiments_of(tables(2))
     blocks = (stickiness, replace(stickiness, name="back"))
     captions = [table.caption for table in answer_tables(example(experiments=blocks))]
     assert [caption.partition(" [")[0] for caption in captions] == ["Every score of stickiness", "Every score of back"]
+    predictions = [p for p in example().predictions if p.experiment == "stickiness"]
+    assert "mean score of back [0–100]" in relation_panel(blocks[1], predictions).svg
 
 
 def deep_block(v, *, doubt=""):

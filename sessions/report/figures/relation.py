@@ -156,7 +156,7 @@ def relation_panel(experiment: Experiment, predictions: Sequence[PredictionFindi
     lowest, highest = min([low - 0.75 * room, *limits]) - room / 4, max([high + 0.75 * room, *limits]) + room / 4
     axes.set(xlim=(-11, 106), ylim=(lowest, highest), xticks=_TICKS)
     score = "mean score" if any(m.n > 1 for m, *_ in points) else "score"
-    axes.set_xlabel(f"{score} of {experiment.descriptor} [0–100]")
+    axes.set_xlabel(f"{score} of {experiment.name} [0–100]")
     axes.set_ylabel(f"predicted {quantity.label} [{quantity.unit}]")
     title = f"range of {quantity.label}: {quantity.text(high - low)} ({spread_share(low, high)})"
     axes.set_title(f"{relation_title(experiment)}\n{title}\n{rival_title(experiment.rivals)}".strip())
@@ -164,7 +164,7 @@ def relation_panel(experiment: Experiment, predictions: Sequence[PredictionFindi
     from_zero.set(xlim=(-1, 1), ylim=(min(0.0, 1.15 * low), max(0.0, 1.15 * high)), xticks=[])
     from_zero.set_xlabel(f"from 0\n[{quantity.unit}]")
     from_zero.spines["bottom"].set_visible(False)
-    name, title = f"relation-{experiment.name}", f"Predicted {quantity.label} against score of {experiment.descriptor}"
+    name, title = f"relation-{experiment.name}", f"Predicted {quantity.label} against score of {experiment.name}"
     header = ("index", "mean score", "95 % interval low", "95 % interval high", "own score")
     header += (f"{quantity.label} [{quantity.kept_unit}]", f"error estimate of {quantity.label} [-]")
     interval = f"95 % interval of {quantity.label} by friction"
