@@ -329,10 +329,7 @@ def test_a_verb_that_is_stopped_after_it_recorded_says_where_that_is(tmp_path, c
 
     monkeypatch.setattr(*making, study)
     assert run([*words, "--out", str(tmp_path / "kept"), "--json"]) == 3
-    output, sentence = capsys.readouterr(), f"stopped; what was recorded is in {tmp_path / 'kept'}"
-    assert output.err.endswith(f"daq-app: {sentence}\n")
-    document = {"folder": str(tmp_path / "kept"), "error": {"kind": "stopped", "message": sentence}}
-    assert json.loads(output.out) == document
+    assert answer(capsys)["error"]["message"] == f"stopped; what was recorded is in {tmp_path / 'kept'}"
     monkeypatch.setattr(*making, stop)
     assert run([*words, "--out", str(tmp_path / "none")]) == 130
 
