@@ -285,29 +285,20 @@ Command = (
 
 AnswerEvent = Scored | MagnitudeEstimate | PairedChoice
 
-ANSWER_EVENTS: dict[Answer, type[AnswerEvent] | None] = {
-    "line": Scored,
-    "number": MagnitudeEstimate,
-    "choice": PairedChoice,
-    "none": None,
-}
+_EVENTS_OF: dict[Answer, type[AnswerEvent]] = {"line": Scored, "number": MagnitudeEstimate, "choice": PairedChoice}
 
 
 def answer_problem(answer: AnswerEvent, expected: Answer) -> str | None:
-    """Return a sentence on what is wrong with an answer where `expected` is due; None where nothing is.
+    """Return a sentence on what is wrong with an answer where `expected`, not "none", is due; None where nothing is.
 
     >>> answer_problem(Scored(120.0), "line")
     'a score lies between 0 and 100; 120 does not'
     >>> answer_problem(Scored(12.0), "number")
     'this trial asks for a number, not for a score'
     """
-    expected_kind = ANSWER_EVENTS[expected]
-    if expected_kind is None:
-        return "this trial asks for no answer"
+    expected_kind = _EVENTS_OF[expected]
     if not isinstance(answer, expected_kind):
         return f"this trial asks for {EVENT_NAMES[expected_kind]}, not for {EVENT_NAMES[type(answer)]}"
-    if answer.corrections is not None and answer.corrections < 0:
-        return f"an answer is corrected a number of times; {answer.corrections} is none"
     match answer:
         case Scored(score) if score is not None and not 0 <= score <= 100:
             return f"a score lies between 0 and 100; {score:g} does not"
