@@ -1,14 +1,14 @@
 """Refine a mesh where its error comes from, and choose the load steps of a path.
 
-A mesh is refined by the share of each column and row in the error of the ending's SED.
+A mesh is refined by the part of each column and row in the error of the ending's SED.
 
 The lines of a mesh divide it into columns and rows. The solution u and the adjoint z of the SED are computed on the
 nested mesh, which divides every element into four. A column does not resolve the differences between u and z and their
-quadratic interpolants across it. The mutual shear energy of both differences is the column's share of the error
+quadratic interpolants across it. The mutual shear energy of both differences is the column's part of the error
 (dual-weighted residuals: Becker and Rannacher 2001, Acta Numerica 10, 1; by directions: Richter 2010, Int. J. Numer.
 Meth. Fluids 62, 90). The same holds for rows. The volumetric energy is left out, because interpolants of nearly
-incompressible tissue change volume and solutions do not. The shares are therefore relative, and are scaled to the
-estimate from two meshes (`solver.accuracy.error_estimate`).
+incompressible tissue change volume and solutions do not. For refinement the parts are scaled to the estimate from two
+meshes (`solver.accuracy.error_estimate`), which they bound where they cancel in the change.
 
 At finite strain the stiffness of the undeformed body replaces the tangent.
 """
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from solver._kernels import OPEN, SLIP, STICK
-from solver.accuracy.convergence_order import change_factor
+from solver.accuracy.convergence_order import change_factor, local_excess, order_of
 from solver.accuracy.error_estimate import NO_NESTED_STATE, PARTS, WIDTH, Steps, edge_errors, errors
 from solver.arrays import Array, Indices
 from solver.body import Patches
@@ -43,6 +43,7 @@ GROWTH = 1.3  # of the unknowns in a round, at least
 TARGET_ERROR = 0.6  # sum of the parts on the next mesh, relative to the tolerance
 SHARE_ORDER = 4.0  # power of a gap's size with which its part falls, where solutions are smooth
 _SCALES = 200  # scales to try, each a tenth smaller
+CORNERS = np.ix_([0, -1], [0, -1])  # of a mesh, by column and row
 QUADRATIC = line(np.linspace(-1.0, 1.0, 5))[0]  # (5, 3) from the nodes of one element to those of its two halves
 
 
@@ -72,10 +73,11 @@ class NestedGrid:
         fit = np.asarray(np.linalg.solve(transpose @ affine, transpose), np.float64)
         return NestedGrid(finger, nodes, shear, affine, fit)
 
-    def parts(self, displacement: Array, state: EquilibriumState) -> tuple[Array, Array]:
-        """Return the shares of columns (a,) and rows (b,) in the error of the SED [MPa], up to a common factor.
+    def parts(self, displacement: Array, state: EquilibriumState) -> tuple[Array, Array, float]:
+        """Return the parts of columns (a,) and rows (b,) in the change of the SED to this mesh [MPa], with their signs.
 
-        `displacement` (nodes, 2) and the contact states of `state` are those on this mesh.
+        The third number is the size of the parts of the mesh's corners, where held edges meet free ones. `displacement`
+        (nodes, 2) and the contact states of `state` are those on this mesh.
         """
         dual = adjoint(self.finger, displacement, state)
         primal, dual = (self._curvature(field) for field in (displacement, dual))
@@ -84,7 +86,9 @@ class NestedGrid:
             field - (QUADRATIC @ field[:, :, ::2].reshape(*five[:2], 3, 10)).reshape(five) for field in (primal, dual)
         ]
         rows = [field - QUADRATIC @ field[:, :, :, ::2] for field in (primal, dual)]
-        return np.abs(self._energy(*columns).sum(axis=1)), np.abs(self._energy(*rows).sum(axis=0))
+        by_column, by_row = self._energy(*columns), self._energy(*rows)
+        corners = float(np.sum(np.abs(by_column[CORNERS]) + np.abs(by_row[CORNERS])))
+        return by_column.sum(axis=1), by_row.sum(axis=0), corners
 
     def _curvature(self, values: Array) -> Array:
         """Return nodal values (nodes, 2) by element (a, b, 5, 5, 2), less their best fit by 1, x, y.
@@ -137,32 +141,40 @@ def nested_numbers(
     values: Array,
     changes: tuple[Array, Array],
     steps: Steps | None,
-    order: float,
 ) -> NestedNumbers | NotConverged:
     """Return the results of a nested state, with the shares of columns and rows where a finer mesh may be needed.
 
     `numbers` (COUNT,) are the scene's results in the `answer`. `values` (COUNT + r,) are the `numbers_and_row` of the
     `nested` state, and `changes` (m, COUNT + r) come from `edge_changes` in both. `steps` are the load steps where the
-    state depends on its load path, and `order` is its `order_of`. Returns NO_NESTED_STATE where no equilibrium exists
-    with an edge moved, as at a friction limit.
+    state depends on its load path. Returns NO_NESTED_STATE where no equilibrium exists with an edge moved, as at a
+    friction limit.
     """
+    order = order_of(scene)
     edges, factor = edge_errors(*changes, order, linear=[WIDTH]), change_factor(order, scene.solve.kinematics)
     if np.isinf(edges).any():
         return NO_NESTED_STATE
     results = values[:COUNT] if steps is None else steps.extrapolate(values[:COUNT])
-    outcome = NestedNumbers(results, edges[..., :COUNT], values[COUNT:], edges[..., COUNT:], factor)
+    change = abs(float(results[0] - numbers[0]))
+    local = _local_parts(*nested) if scene.solve.kinematics == "finite" else None
+    bound = 0.0 if local is None else change + local_excess(*local, order)
+    outcome = NestedNumbers(results, edges[..., :COUNT], values[COUNT:], edges[..., COUNT:], factor, bound)
     target = scene.solve.target
     misses_tolerance = target is not None and errors(scene, numbers, outcome, steps).error_estimate > target
     if not misses_tolerance and scene.solve.contrast_tolerance is None:
         return outcome
-    finger, state = nested
-    parts = np.concatenate(_grid(finger).parts(finger.displacement(state), state))
-    change = abs(float(outcome.numbers[0] - numbers[0]))
-    parts *= factor * change / max(float(parts.sum()), np.finfo(float).tiny)
+    parts, _ = _local_parts(*nested) if local is None else local
+    parts = np.abs(parts)
+    parts *= max(factor * change, bound) / max(float(parts.sum()), np.finfo(float).tiny)
     columns = np.concatenate([_columns_of_edges(*state) for state in (answer, nested)])
     np.add.at(parts, columns, edges[edges[..., 0].sum(axis=1).argmax(), :, 0])
     whole = float(parts.sum())
     return replace(outcome, shares=parts / whole if whole > 0.0 else None)
+
+
+def _local_parts(finger: Finger[Any], state: EquilibriumState) -> tuple[Array, float]:
+    """Return `NestedGrid.parts` of a nested state: of columns and rows (a + b,), and of corners [MPa]."""
+    columns, rows, corners = _grid(finger).parts(finger.displacement(state), state)
+    return np.concatenate([columns, rows]), corners
 
 
 def _columns_of_edges(finger: Finger[Any], state: EquilibriumState) -> Indices:

@@ -6,7 +6,7 @@ and errors of the energy follow the power 2 a. Such a corner lies where bone mee
 
 At finite strain that corner is squeezed further on each finer mesh. A free face folds where it is squeezed along itself
 below a critical stretch (Biot 1963, Appl. Sci. Res. A 12, 168). Where only one element falls below it, the mesh does
-not resolve a fold, and the corner sets the order. Where more do, the cut folds. Such folds have no intrinsic size:
+not resolve a fold. Where more do, the cut folds. Such folds have no intrinsic size:
 finer meshes fold differently, and no error is known. The same is true where a stiff layer wrinkles on a soft one (Allen
 1969, Analysis and Design of Structural Sandwich Panels, chapter 8): its equilibrium without wrinkles is unstable.
 """
@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from solver.arrays import Array
 from solver.continuation import critical_stretch
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import Finger, FiniteFinger, finite_laws, settled_moduli
@@ -27,8 +28,7 @@ from solver.scene import Scene
 from solver.scene.tables import TISSUES, Materials
 
 ORDER, CORNER_ORDER = 2.0, 1.0  # beneath a contact, and at a corner
-# Largest ratio of stiffnesses of neighbouring tissues in the trials in which errors fall with the square [-].
-SECOND_ORDER = {"small": 100.0, "finite": 6.0}
+TRIAL_RATIO = 100.0  # largest ratio of stiffnesses of neighbouring tissues in the trials where estimates hold [-]
 
 
 def richardson_factor(order: float) -> float:
@@ -50,29 +50,40 @@ def change_factor(order: float, kinematics: str) -> float:
     return richardson_factor(order) * (SAFETY if kinematics == "finite" and order == ORDER else 1.0)
 
 
-def order_of(finger: Finger[Any], state: EquilibriumState) -> float:
-    """Return the order of convergence that an estimate assumes, from the `state` on its nested mesh.
+def local_excess(parts: Array, corners: float, order: float) -> float:
+    """Return how much larger the SED's error may be than its change, from signed `parts` (n,) of the change [MPa].
 
-    It is `CORNER_ORDER` where the element at the corner of bone and cut is squeezed, where neighbouring tissues differ
-    in stiffness by more than in trials that show second order, or where skin stiffens as it stretches. Raises Folds
-    where the cut folds or tissue wrinkles.
+    Each part of the error lies between that of the change and `richardson_factor` times it. Those of `corners`, in all,
+    may have `CORNER_ORDER`. So parts that cancel in the change may not cancel in the error.
+
+    >>> round(local_excess(np.array([3.0, -1.0]), 0.0, ORDER), 9)  # a change of 2, an error of 4/3 x 3 - 1
+    1.0
     """
-    scene = finger.scene
-    squeezed = False
-    if isinstance(finger, FiniteFinger):
-        squeezed = scene.finger.cut == "free" and _check_cut(finger, state)
-        if not finger.newton.is_stable(state):
-            raise Folds(WRINKLES)
-    stiffens = any(tissue.law == "ogden" for tissue in scene.meshed_tissues)
-    at_corner = squeezed or stiffens or _stiffness_ratio(scene.materials)[0] > SECOND_ORDER[scene.solve.kinematics]
-    return CORNER_ORDER if at_corner else ORDER
+    usual = richardson_factor(order) - 1.0
+    positive, negative = np.maximum(parts, 0.0).sum(), np.maximum(-parts, 0.0).sum()
+    return usual * float(max(positive, negative)) + (richardson_factor(CORNER_ORDER) - 1.0 - usual) * corners
 
 
-def _check_cut(finger: FiniteFinger, state: EquilibriumState) -> bool:
-    """Return whether an element at the free cut of a nested mesh is squeezed below the stretch at which faces fold.
+def order_of(scene: Scene) -> float:
+    """Return the order of convergence that estimates of a scene assume.
 
-    Raises Folds where more than one is at either end.
+    It is `CORNER_ORDER` where neighbouring tissues differ in stiffness by more than in trials that show second order.
     """
+    return CORNER_ORDER if _stiffness_ratio(scene.materials)[0] > TRIAL_RATIO else ORDER
+
+
+def refuse_folds(finger: Finger[Any], state: EquilibriumState) -> None:
+    """Raise Folds where errors do not converge, since the free cut folds or tissue wrinkles in a `state`."""
+    if not isinstance(finger, FiniteFinger):
+        return
+    if finger.scene.finger.cut == "free":
+        _refuse_folded_cut(finger, state)
+    if not finger.newton.is_stable(state):
+        raise Folds(WRINKLES)
+
+
+def _refuse_folded_cut(finger: FiniteFinger, state: EquilibriumState) -> None:
+    """Raise Folds where more than one element at an end of a nested mesh's cut is squeezed as faces are that fold."""
     mesh = finger.body.mesh
     columns = np.arange(len(mesh.elements)).reshape(len(finger.geometry.arcs) - 1, -1)
     outer = columns[[0, 1, -2, -1]].ravel()  # in the outer columns of the mesh that this one divides
@@ -80,15 +91,12 @@ def _check_cut(finger: FiniteFinger, state: EquilibriumState) -> bool:
     least = np.linalg.svd(F, compute_uv=False)[..., -1].min(axis=1)
     laws = finite_laws(finger.scene.materials)
     folds = np.array([critical_stretch(laws[region]) for region in mesh.region[outer]])
-    ends = (least < folds).reshape(2, -1).sum(axis=1)
-    if ends.max() > 1:
+    if (least < folds).reshape(2, -1).sum(axis=1).max() > 1:
         worst = int((least - folds).argmin())
         raise cut_folds(float(least[worst]), float(folds[worst]))
-    return bool(ends.any())
 
 
 _ROUND_OFF = 1e-12  # relative, of a stiffness
-TRIAL_RATIO = 100.0  # largest ratio of stiffnesses of neighbouring tissues in the trials where estimates hold [-]
 TRIAL_DEPTH = 0.5  # deepest presses at finite strain in those trials, relative to the tissue's thickness [-]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from solver.accuracy import audits
 from solver.accuracy.adaptivity import choose_steps, nested_numbers, steps_of_press
-from solver.accuracy.convergence_order import order_of
+from solver.accuracy.convergence_order import refuse_folds
 from solver.accuracy.error_estimate import NO_NESTED_STATE, Steps, edge_changes
 from solver.arrays import Array
 from solver.continuation.existence import is_folded, is_sound, limit_warnings, refuse_far_beyond
@@ -216,7 +216,7 @@ def solve_nested(
         else:
             steps = None
             state = slide_near(finger, scene, start) or settled_state(finger, scene, start)
-        order = order_of(finger, state)
+        refuse_folds(finger, state)
     except Folds as failure:
         return failure, steps
     except SolveFailure:
@@ -224,7 +224,7 @@ def solve_nested(
     forces = None if scene.viscoelastic else forces_of(scene, state.load)
     values, nested_changes = edge_changes(finger.newton, state, forces, finger.numbers_and_row)
     answer, nested, moves = (top.finger, last), (finger, state), (changes, nested_changes)
-    return nested_numbers(scene, numbers, answer, nested, values, moves, steps, order), steps
+    return nested_numbers(scene, numbers, answer, nested, values, moves, steps), steps
 
 
 FINITE_IMBALANCE = 1e-8  # relative residual of the forces from which a state is corrected further [-]

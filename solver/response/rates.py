@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver.accuracy.adaptivity import FingerState
-from solver.accuracy.convergence_order import change_factor, order_of
+from solver.accuracy.convergence_order import change_factor, order_of, refuse_folds
 from solver.accuracy.error_estimate import PARTS, WIDTH, edge_changes, edge_errors, half_width
 from solver.arrays import Array
 from solver.contact import ForceLoad
@@ -108,9 +108,11 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
         courses = [history(scene, mesh, path) for path in paths]
         path = march_on(nested, float(PARTS[0]))
         course = history(scene, nested, path)
-        order = min(order_of(nested, state) for state in states_at(path, course))
+        for state in states_at(path, course):
+            refuse_folds(nested, state)
     except SolveFailure:
         return CourseNumbers(usual.value * np.nan, usual.rate * np.nan)
+    order = order_of(scene)
     factor = change_factor(order, scene.solve.kinematics)
     finer, fewer = course_numbers(course), [course_numbers(numbers) for numbers in courses]
     edges = np.zeros((2, *usual.value.shape))

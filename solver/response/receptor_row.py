@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver.accuracy.adaptivity import FingerState
-from solver.accuracy.convergence_order import change_factor, order_of
+from solver.accuracy.convergence_order import change_factor, order_of, refuse_folds
 from solver.accuracy.error_estimate import PARTS, Steps, edge_changes, edge_errors, half_width
 from solver.arrays import Array
 from solver.body import Patches
@@ -76,7 +76,8 @@ def _row_errors(prediction: Prediction, values: Array, arcs: Array, receptor: Re
     in_steps = nested[1].load.path_dependent
     if in_steps:
         answer, nested = ((finger, end_of_path(scene, finger)) for finger, _ in (answer, nested))
-    order = order_of(*nested)
+    refuse_folds(*nested)
+    order = order_of(scene)
     factor = change_factor(order, scene.solve.kinematics)
     (_, on_mesh), (finer, on_nested) = (
         edge_changes(finger.newton, state, forces_of(scene, state.load), row_numbers(finger))

@@ -13,7 +13,6 @@ import numpy as np
 
 from solver.accuracy import audits
 from solver.accuracy.adaptivity import choose_steps, nested_numbers, steps_of_press
-from solver.accuracy.convergence_order import order_of
 from solver.accuracy.error_estimate import NO_NESTED_STATE, Steps, edge_changes_of_all
 from solver.arrays import Array
 from solver.continuation.small_states import (
@@ -212,9 +211,7 @@ def nested_numbers_of_all(
         with_forces = [(state, forces_of(solutions[number].scene, state.load)) for number, state in states.items()]
         values, nested_changes = edge_changes_of_all(mesh.newton, with_forces, mesh.numbers_and_row)
         for (number, state), value, nested_change in zip(states.items(), values, nested_changes, strict=True):
-            solution, order = solutions[number], order_of(mesh, state)
+            solution = solutions[number]
             answer, nested, moves = (finger, solution.state), (mesh, state), (changes[number], nested_change)
-            out[number] = nested_numbers(
-                solution.scene, numbers[number], answer, nested, value, moves, solution.steps, order
-            )
+            out[number] = nested_numbers(solution.scene, numbers[number], answer, nested, value, moves, solution.steps)
     return out

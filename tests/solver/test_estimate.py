@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver import Finger, Friction, Loading, Material, Materials, Receptor, Relaxation, Scene, Solve, solve
-from solver.accuracy.convergence_order import change_factor, trial_warnings
+from solver.accuracy.convergence_order import change_factor, local_excess, trial_warnings
 from solver.accuracy.error_estimate import WIDTH, edge_errors, errors, half_width
 from solver.continuation.small_states import expected_depth, nearest_state, settled_state
 from solver.equilibrium import EQUILIBRIUM
@@ -113,6 +113,26 @@ def test_errors_of_any_order_and_edges_at_any_place_lie_below_the_estimate_and_s
     assert 0.9 < largest <= 1.0 + 1e-12
 
 
+def test_parts_of_an_error_that_cancel_in_the_change_and_fall_at_different_rates_lie_below_the_bound():
+    rng, largest = np.random.default_rng(6), 0.0
+    for _ in range(20000):
+        *_, corner = parts = rng.normal(size=3)  # of the change
+        most = np.array([4 / 3, 4 / 3, 2.0])  # errors by parts of the second order, and of the first at a corner
+        error = abs(float(parts @ (1.0 + rng.integers(0, 2, 3) * (most - 1.0))))
+        largest = max(largest, error / (abs(parts.sum()) + local_excess(parts, abs(corner), 2.0)))
+    assert 0.99 < largest <= 1.0 + 1e-12
+
+
+def test_an_error_that_cancels_in_the_change_lies_below_the_estimate():
+    sliding = random_scene("fingers", 44004, "finite")
+    truth = 0.00260875  # SED on two meshes of 40 elements to a tip radius and a refined one, which differ by 0.03 %
+    prediction = solve(replace(sliding, solve=replace(sliding.solve, tolerance=0.003, evidence="quick")))
+    nested, error = prediction.nested, abs(prediction.sed_ending - truth)
+    change = abs(nested.numbers[0] - prediction.sed_ending)
+    by_change = half_width(change, nested.edge_errors[..., 0], nested.factor)
+    assert by_change < error / 2.0 < error < prediction.error_estimate * prediction.sed_ending
+
+
 def test_the_sed_follows_an_edge_of_contact_by_a_parabola_about_a_place_within_half_a_node():
     """The states of contact are changed by hand, and the linearised body solved under each; no estimate has a part."""
     ratios, places = [], []
@@ -174,15 +194,12 @@ def test_the_nested_value_is_nearer_the_truth_than_the_meshs_own(kinematics):
     assert max(ratios) < 1.0
 
 
-CANCELS = pytest.mark.xfail(strict=True, reason="errors by columns and by rows cancel in the change, as the docs say")
-
-
 @pytest.mark.parametrize(
     ("case", "tolerance"),
     [
         pytest.param(DECEIVING[0], None, id="layers"),
         pytest.param(DECEIVING[0], 0.01, id="layers, 1 %", marks=pytest.mark.slow),
-        pytest.param(DECEIVING[1], None, id="bound", marks=CANCELS),
+        pytest.param(DECEIVING[1], None, id="bound"),
         pytest.param(DECEIVING[1], 0.01, id="bound, 1 %", marks=pytest.mark.slow),
     ],
 )
@@ -268,14 +285,11 @@ def test_the_error_at_a_corner_of_very_stiff_tissue_is_of_first_order_and_the_es
     [
         ("small", Material(3.4, 0.48), 2.0),  # 100 times as stiff as the fat
         ("small", Material(3.5, 0.48), 1.0),
-        ("finite", Material(0.204, 0.48), 2.0),  # 6 times
-        ("finite", Material(0.21, 0.48), 1.0),
-        ("finite", Material(0.08, 0.48, "ogden", 8.0), 1.0),
+        ("finite", Material(3.4, 0.48), 2.0),
+        ("finite", Material(3.5, 0.48), 1.0),
     ],
 )
-def test_errors_fall_with_the_square_where_neither_stiff_nor_stiffening_skin_carries_the_drag_to_the_cut(
-    kinematics, dermis, order
-):
+def test_errors_fall_with_the_square_where_no_very_stiff_skin_carries_the_drag_to_the_cut(kinematics, dermis, order):
     settings = Solve(kinematics, evidence="quick")
     press = Scene(
         materials=Materials(dermis=dermis), friction=Friction(0.0), loading=Loading(0.4, "none"), solve=settings
