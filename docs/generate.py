@@ -4,7 +4,7 @@ from pathlib import Path
 
 import against_the_paper
 import looks
-import study_keys
+import record_keys
 
 from daq_app.cli import main
 from daq_app.qt import start
@@ -17,7 +17,7 @@ def write(folder: Path) -> None:
         "command-line": command_line(),
         "against-the-paper": against_the_paper.page(),
         "looks": looks.page(),
-        "study-keys": study_keys.page(),
+        **record_keys.pages(),
     }
     looks.write_pictures(folder)
     for file in folder.glob("*.md"):  # a page of an earlier version is in no table of contents

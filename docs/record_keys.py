@@ -1,4 +1,4 @@
-"""The page on the keys of `study.json`, made from the records that it holds."""
+"""Pages on the keys of `study.json`, scenes and protocols, made from the types that they become."""
 
 import ast
 import inspect
@@ -8,10 +8,12 @@ from itertools import takewhile
 import looks
 import msgspec
 
+from sessions.plan.protocols.protocol import Protocol
 from sessions.statistics.findings import StudyFindings
 from sessions.strokes.stroke import meanings
+from solver import Scene
 
-HEAD = """# Keys of a study's numbers
+STUDY = """# Keys of a study's numbers
 
 `study.json` holds one `StudyFindings`. Null stands where a number is withheld or does not apply. A number without a unit is a
 count, a share, a correlation or a p. That of a record of its own, such as `Average`, has the unit of the key that holds the
@@ -19,10 +21,31 @@ record. A point is one of the 100 of a score. [The scene](../../scene-file.md) h
 """
 
 
-def page() -> str:
-    """Return the page: a table for each record."""
-    lines = [HEAD]
-    for record in _records():
+SCENE = """# Keys of a scene file
+
+A table for each table of the file, `Scene` first. [The scene](../../scene-file.md) explains them and their ranges.
+"""
+
+PROTOCOL = """# Keys of a protocol file
+
+A table for each table of the file, `Protocol` first. [Add a protocol](../../how-to/add-a-protocol.md) explains them and their
+ranges.
+"""
+
+
+def pages() -> dict[str, str]:
+    """Return the text of each page by its name."""
+    return {
+        "study-keys": _page(STUDY, StudyFindings),
+        "scene-keys": _page(SCENE, Scene),
+        "protocol-keys": _page(PROTOCOL, Protocol),
+    }
+
+
+def _page(head: str, root: type) -> str:
+    """Return a page with a table for each record of `root`."""
+    lines = [head]
+    for record in _records(root):
         annotated = meanings(record).items()
         texts = _comments(record) | {key: f"{text} [{unit}]" if unit else text for key, (unit, text) in annotated}
         rows = [(f"`{key}`", f"`{_cell(kind)}`", _cell(texts[name])) for name, (key, kind) in _types(record).items()]
@@ -31,12 +54,13 @@ def page() -> str:
     return "\n".join(lines)
 
 
-def _records() -> list[type]:
-    """Return the types of all records of `study.json`, without scenes."""
+def _records(root: type) -> list[type]:
+    """Return `root` and the types of all records that it holds, of its own package."""
     records: dict[type, None] = {}
+    package = root.__module__.partition(".")[0]
 
     def add(hint: object) -> None:
-        is_record = getattr(hint, "__module__", "").startswith("sessions.") and hasattr(hint, "__annotations__")
+        is_record = getattr(hint, "__module__", "").startswith(f"{package}.") and hasattr(hint, "__annotations__")
         if is_record and hint not in records:
             records[hint] = None
             for field in typing.get_type_hints(hint).values():
@@ -44,12 +68,12 @@ def _records() -> list[type]:
         for part in typing.get_args(hint):
             add(part)
 
-    add(StudyFindings)
+    add(root)
     return list(records)
 
 
 def _types(record: type) -> dict[str, tuple[str, str]]:
-    """Return the key of each field, and its type as it is written, without units and meanings."""
+    """Return the key of each field, and its type and default as they are written, without units and meanings."""
     structs = msgspec.structs.fields(record) if issubclass(record, msgspec.Struct) else ()
     keys = {field.name: field.encode_name for field in structs}
     types: dict[str, tuple[str, str]] = {}
@@ -57,7 +81,8 @@ def _types(record: type) -> dict[str, tuple[str, str]]:
         name, kind = node.target.id, ast.unparse(node.annotation)
         if kind.startswith("Annotated["):
             kind = ast.unparse(node.annotation.slice.elts[0])
-        types[name] = keys.get(name, name), kind
+        default = f" = {ast.unparse(node.value)}" if isinstance(node.value, ast.Constant) else ""
+        types[name] = keys.get(name, name), kind + default
     return types
 
 
