@@ -27,7 +27,9 @@ _HELP = (
 )
 PAUSED = "The session is paused. Type resume to continue."
 KEYBOARD = "keyboard"
-PERCEPTION = 0.4  # a person's Enter that comes sooner after a question was meant for the one before [s]
+# A person's Enter that comes sooner after a question was meant for the one before [s]. The window waits as long: Qt's
+# default for a double click.
+PERCEPTION = 0.4
 _CHOICES: dict[float | None, Literal["first", "second"] | None] = {1.0: "first", 2.0: "second", None: None}
 _WAYS = {1: "from proximal to distal (away from the subject)", -1: "from distal to proximal (towards the subject)"}
 

@@ -92,9 +92,7 @@ class MeanScore:
     n: int  # subjects, not trials
     mean: float  # of the scores [points]
     sd: float | None  # standard deviation between subjects [points]
-    low: (
-        float | None
-    )  # 95 % t interval of the mean, clipped to the scale, which contains the population's mean [points]
+    low: float | None  # 95 % t interval of the mean, clipped to the scale, which holds the population's mean [points]
     high: float | None  # its upper end [points]
     reason: str | None
 
