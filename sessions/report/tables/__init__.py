@@ -98,7 +98,7 @@ def table(name: str, caption_name: str, columns: str, groups: Iterable[Rows], **
 
     def with_mark(content: Cell | str | int) -> Cell:
         cell = content if isinstance(content, Cell) else Cell(str(content))
-        letter = "" if cell.note in ("", _UNMARKED) else _letters(sum(map(bool, marks.values())))
+        letter = "" if cell.note in ("", _UNMARKED) else note_mark(sum(map(bool, marks.values())))
         return replace(cell, mark=marks.setdefault(cell.note, letter)) if cell.note else cell
 
     cells = ((name, tuple(tuple(map(with_mark, row)) for row in rows)) for name, rows in groups)
@@ -111,7 +111,8 @@ def table(name: str, caption_name: str, columns: str, groups: Iterable[Rows], **
     return Table(name, short_caption, tuple(Column(heading, unit) for heading, _, unit in headings), non_empty, notes)
 
 
-def _letters(n: int) -> str:
+def note_mark(n: int) -> str:
+    """Return the mark of note `n` from 0: a to z, then aa, ab and so on."""
     return (chr(ord("a") + n // 26 - 1) if n >= 26 else "") + chr(ord("a") + n % 26)
 
 
