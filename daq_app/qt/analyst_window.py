@@ -5,7 +5,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QEvent, QSignalBlocker, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QObject, QSignalBlocker, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import QFileDialog, QLabel, QMainWindow, QProgressBar, QSizePolicy, QTabWidget, QWidget
 
@@ -101,6 +101,8 @@ class AnalystWindow(QMainWindow):
         self._panels = [Panel(name.lower()) for name in self._columns]
         for panel, area in zip(self._panels, self._areas, strict=True):
             vbox(area, on=panel, margins=GRID)
+        for column in self._columns.values():
+            column.installEventFilter(self)
         self._pages = QTabWidget()
         self._pages.setAccessibleName(tr("trials, stroke or model"))
         self._panes = QWidget()
@@ -158,6 +160,12 @@ class AnalystWindow(QMainWindow):
         set_horizontal(self._foot, self.width() >= px(_ONE_ROW))
         self._place_columns()
         self.keys.fit()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Place the columns anew after one of them has asked for another size."""
+        if event.type() == QEvent.Type.LayoutRequest:
+            QTimer.singleShot(0, self, self._place_columns)
+        return super().eventFilter(watched, event)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         self._timer.stop()
@@ -224,7 +232,6 @@ class AnalystWindow(QMainWindow):
         self.lineage.show_links(lineage(state))
         for column in (self.trials, self.stroke, self.model):
             column.show_state(state)
-        QTimer.singleShot(0, self, self._place_columns)  # after the layouts inside the columns
 
     def _place_columns(self) -> None:
         least = [column.minimumSizeHint().width() + 2 * GRID for column in self._columns.values()]

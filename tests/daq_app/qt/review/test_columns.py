@@ -383,3 +383,14 @@ def test_a_recorded_session_is_opened_and_analysed_while_the_window_stays_alive(
     assert window.state.report is not None, window.state.outcome
     assert window.state.report.session == SESSION.name
     window.close()
+
+
+def test_a_column_that_needs_more_room_for_what_has_come_gets_it_at_once(application, window):
+    window.stroke.player.time_label.setText("")
+    window.resize(1284, 860)
+    application.processEvents()
+    stroke = selected_row(window.state).stroke
+    window.take(m.Excerpt(stroke.number, raw(stroke)))  # the time of a reading stands in a row that was full
+    areas = window._areas
+    until(application, lambda: all(area.horizontalScrollBar().maximum() == 0 for area in areas))
+    assert not window._narrow
