@@ -72,16 +72,17 @@ class PlayedRecorder:
             load = loads(wrench, np.array(RATED)).max(axis=0)
             self._peak = np.fmax(self._peak, load)
             shares = {"load": tuple(load.tolist()), "peak": tuple(self._peak.tolist())}
-            self._queue.append(structs.replace(self._health, **shares))
+            self._health = structs.replace(self._health, **shares)
+            self._queue.append(self._health)
             self._last = int(number[-1]) + 1
 
     def send(self, request: object) -> None:
         """Do nothing."""
 
     def poll(self, timeout: float = 0.0) -> tuple[m.Report, ...]:  # noqa: ARG002  it does not wait
-        """Return the scripted reports."""
+        """Return the scripted reports, or that the bench's health is the same while the script waits."""
         reports, self._queue = tuple(self._queue), []
-        return reports
+        return reports or (self._health,)
 
     def close(self) -> None:
         """Do nothing."""
