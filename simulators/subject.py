@@ -28,7 +28,10 @@ class SubjectSettings:
 
 
 class SimulatedSubject:
-    """One subject. The same seed gives the same strokes and scores, independent of the order of the surfaces."""
+    """One subject. The same seed gives the same strokes and scores, independent of the order of the surfaces.
+
+    A `repetition` counts the strokes on a surface in a visit, from 1: each is made and judged anew.
+    """
 
     def __init__(self, seed: int, settings: SubjectSettings | None = None) -> None:
         self.seed = seed
@@ -64,12 +67,14 @@ class SimulatedSubject:
             across=float(draw.normal(0.0, 1.0)),
         )
 
-    def score(self, surface: Surface, take: int = 1, position: int = 0, previous_index: int | None = None) -> float:
+    def score(
+        self, surface: Surface, repetition: int = 1, position: int = 0, previous_index: int | None = None
+    ) -> float:
         """Return the score on the line from 0 to 100, in tenths: the mark's position in hundredths of the line.
 
         `position` counts the earlier trials of the block, `previous_index` is the index judged last; None: the first.
         """
-        noise = self._draw(surface, take, 4).normal(0.0, self.settings.judgement_noise)
+        noise = self._draw(surface, repetition, 4).normal(0.0, self.settings.judgement_noise)
         score = self.expected_score(surface, position, previous_index) + float(noise)
         return round(min(max(score, 0.0), 100.0), 1)
 

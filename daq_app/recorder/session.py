@@ -268,8 +268,14 @@ def _helper(prepared: SessionSetup, bench: Bench) -> Operator | None:
         return None
     subject, surface = SimulatedSubject(people.seed), _surface_of(people, prepared.plan, prepared.writer.folder)
     if people.kind == "simulated people":
-        return SimulatedPeople(subject, prepared.clock, connected, surface)
-    return SimulatedHand(subject, connected, surface)
+        helper = SimulatedPeople(subject, prepared.clock, connected, surface)
+    else:
+        helper = SimulatedHand(subject, connected, surface)
+    trials = {trial.number: trial for trial in prepared.plan.trials}
+    for event in prepared.earlier_events:
+        if event.kind == "stroke_asked" and event.trial is not None:
+            helper.count_stroke(trials[event.trial])
+    return helper
 
 
 def _surface_of(people: m.People, plan: SessionPlan, folder: Path) -> SurfaceOf:

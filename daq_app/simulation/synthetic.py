@@ -248,7 +248,7 @@ class SyntheticPeople(SimulatedPeople):
     def score(self, trial: Trial) -> float:
         """Return the score of a trial, with drift within its block and carry-over from the previous trial."""
         _, position, previous_index = self._order(trial)
-        return self.subject.score(self.surface(trial), 1, position, previous_index)
+        return self.subject.score(self.surface(trial), self.repetition(trial), position, previous_index)
 
     def true_judgement(self, trial: Trial) -> dict[str, Any]:
         """Return a trial's depth, its position, the previous index, and the score without noise."""

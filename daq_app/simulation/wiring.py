@@ -1,5 +1,6 @@
 """Connects real, simulated or replayed transducers and people: sessions reach the simulators only through here."""
 
+from collections import Counter
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
@@ -115,6 +116,8 @@ class SimulatedHand:
         self.subject, self.surface = subject, surface
         self.connected = bench
         self.stroke_trials: list[Trial] = []  # in order, once per take
+        self._strokes = Counter[tuple[str, int]]()  # on each surface
+        self._repetitions: dict[int, int] = {}  # of its surface in the last stroke of each trial
 
     def show(self, command: steps.Command) -> None:
         """Carry out the part of a command that concerns a hand."""
@@ -123,14 +126,25 @@ class SimulatedHand:
             case steps.AskMount(trial) if bench is not None:
                 bench.mount(self.surface(trial))
             case steps.AskStroke(trial):
-                self.stroke_trials.append(trial)
+                self.count_stroke(trial)
                 if bench is not None and self.connected is not None and self.connected.bench_now is not None:
-                    stroke = self.subject.stroke(self.surface(trial), self.take(trial))
+                    stroke = self.subject.stroke(self.surface(trial), self.repetition(trial))
                     bench.begin_stroke(stroke, self.connected.bench_now())
 
     def take(self, trial: Trial) -> int:
         """Return the number of strokes of a trial."""
         return sum(stroke_trial.number == trial.number for stroke_trial in self.stroke_trials)
+
+    def count_stroke(self, trial: Trial) -> None:
+        """Note a stroke that begins, or one from before the session was interrupted."""
+        surface = self.surface(trial)
+        self.stroke_trials.append(trial)
+        self._strokes[surface.descriptor, surface.index] += 1
+        self._repetitions[trial.number] = self._strokes[surface.descriptor, surface.index]
+
+    def repetition(self, trial: Trial) -> int:
+        """Return how often the surface of a trial had been stroked in this visit by its last stroke; 0 before it."""
+        return self._repetitions.get(trial.number, 0)
 
     def poll(self) -> tuple[steps.Event, ...]:
         """Return no events: the transducer measures the hand."""
@@ -186,7 +200,7 @@ class SimulatedPeople(SimulatedHand):
 
     def score(self, trial: Trial) -> float:
         """Return the score of a trial, whose last take is judged."""
-        return self.subject.score(self.surface(trial), self.take(trial))
+        return self.subject.score(self.surface(trial), self.repetition(trial))
 
     def _judgement(self, command: steps.AskScore | steps.AskNumber | steps.AskChoice) -> steps.Event:
         time = self.clock.now_ns() * 1e-9 + self.judgement_s
@@ -195,7 +209,7 @@ class SimulatedPeople(SimulatedHand):
                 score = self.score(trial)
                 return steps.Scored(score, ((time, score),), time, 0, None, INPUT)
             case steps.AskNumber(trial):
-                number = self.subject.number(self.surface(trial), self.take(trial))
+                number = self.subject.number(self.surface(trial), self.repetition(trial))
                 return steps.MagnitudeEstimate(number, time, 0, None, INPUT)
             case steps.AskChoice(first, second):
                 return steps.PairedChoice("first" if self._more(first, second) else "second", time, 0, None, INPUT)
