@@ -11,7 +11,8 @@ from daq_app.wording import errors_text, tr, tr_noop
 from sessions.report.contents import PredictionFinding, Report
 
 ComparisonRows = tuple[tuple[str, tuple[tuple[float | None, float | None], ...]], ...]
-MEAN_PANELS = tr_noop(("µ", "SED [kPa]", "score"))
+_SCORE = "score [points, 0 to 100]"
+MEAN_PANELS = tr_noop(("µ", "SED [kPa]", _SCORE))
 PHASES = {
     "pressing": tr_noop("pressing down"), "sticking": tr_noop("sticking: dragged, nothing slips yet"),
     "slipping in part": tr_noop("slipping in part"), "sliding": tr_noop("sliding: every point slips"),
@@ -42,7 +43,7 @@ def _numbers(report: Report) -> dict[tuple[str, int], dict[str, float]]:
                 samples[prediction.experiment, prediction.index][name].append(value)
     for experiment in report.experiments:
         for score in experiment.scores:
-            samples[experiment.name, score.index]["score"].append(score.mean)
+            samples[experiment.name, score.index][_SCORE].append(score.mean)
     return {key: {name: fmean(sample) for name, sample in values.items()} for key, values in samples.items()}
 
 

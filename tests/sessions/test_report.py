@@ -146,7 +146,7 @@ def test_the_scores_of_whoever_made_the_strokes_stand_beside_the_mean_of_all(ses
     rows = [row[0].text for row in relation_table(report).groups[0].rows]
     assert rows == ["mean score", "own score", "index"]
     panel = relation_panel(experiment, [p for p in report.predictions if p.experiment == experiment.name])
-    assert {row[0]: row[panel.header.index("own score")] for row in panel.rows} == own_by_index
+    assert {row[0]: row[panel.header.index("own score [points, 0 to 100]")] for row in panel.rows} == own_by_index
 
 
 def test_a_simulated_session_says_so_in_its_first_line(report):

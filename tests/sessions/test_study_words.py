@@ -8,8 +8,9 @@ from matplotlib.axes import Axes
 from report_example import example, experiments_of, tables
 from study_example import visit
 
+from daq_app.analyst.finger_words import MEAN_PANELS, compare_reports
 from sessions.report import prose
-from sessions.report.figures.relation import relation_panel, study_plates
+from sessions.report.figures.relation import comparison_panel, relation_panel, score_panel, study_plates
 from sessions.report.pages import study_page
 from sessions.report.study_prose import distinctions, remarks, summary
 from sessions.report.tables.session import answer_tables
@@ -136,6 +137,16 @@ def test_tables_of_answers_and_pictures_of_the_relation_name_their_blocks():
     assert [caption.partition(" [")[0] for caption in captions] == ["Every score of stickiness", "Every score of back"]
     predictions = [p for p in example().predictions if p.experiment == "stickiness"]
     assert "mean score of back [0–100]" in relation_panel(blocks[1], predictions).svg
+
+
+def test_every_column_of_scores_beside_a_picture_names_its_unit():
+    report, study = example(), pool_visits([visit(number) for number in (1, 2)])
+    panels = [score_panel(report.experiments[0]), relation_panel(report.experiments[0], report.predictions)]
+    panels += [panel for plate in study_plates(study) for panel in plate.panels if "paths" not in panel.name]
+    panels.append(comparison_panel(MEAN_PANELS, ("one", "other"), compare_reports(report, report)))
+    headings = [heading for panel in panels for heading in panel.header if "score" in heading]
+    assert {"mean score", "own score", "score of S01", "score"} <= {text.partition(" [")[0] for text in headings}
+    assert all("[points, 0 to 100]" in heading for heading in headings)
 
 
 def deep_block(v, *, doubt=""):

@@ -60,11 +60,16 @@ def score_panel(findings: Experiment | DescriptorFindings) -> Panel | None:
     axes.set(xlim=(-9, 106), ylim=(low, 109), xticks=findings.indices, yticks=_TICKS, title=name)
     axes.set(xlabel=f"index of {findings.descriptor} [–]", ylabel=f"score of {findings.descriptor} [0–100]")
     title = f"Scores of {findings.descriptor} against the stimuli's index"
-    header = ("index", "subjects", "mean score", "standard deviation", "95 % interval low", "95 % interval high")
-    header += tuple(f"score of {subject}" for subject in findings.answers)
+    moments = ("mean score", "standard deviation", "95 % interval low", "95 % interval high")
+    header = ("index", "subjects", *_in_points(*moments, *(f"score of {subject}" for subject in findings.answers)))
     by_index = dict(zip(findings.indices, zip(*findings.answers.values(), strict=True), strict=False))
     rows = tuple((m.index, m.n, m.mean, m.sd, m.low, m.high, *by_index.get(m.index, ())) for m in findings.scores)
     return picture.panel(f"scores-{name}", title, header, rows)
+
+
+def _in_points(*names: str) -> tuple[str, ...]:
+    """Return the headings of columns of scores, with their unit."""
+    return tuple(f"{name} [points, 0 to 100]" for name in names)
 
 
 def study_plates(study: StudyFindings) -> tuple[Plate, ...]:
@@ -121,7 +126,7 @@ def _relation(findings: DescriptorFindings, quantity: ShownResponse) -> Panel:
     within = "" if findings.repeated is None else f": {level} r = {correlation(findings.repeated.r)}"
     axes.set_title(f"{findings.descriptor}{within}\n{rival_title(findings.rivals)}".strip())
     title = f"Score of {findings.descriptor} against predicted {quantity.label}"
-    header = ("subject", "index", f"{quantity.label} [{quantity.kept_unit}]", "score")
+    header = ("subject", "index", f"{quantity.label} [{quantity.kept_unit}]", *_in_points("score"))
     return picture.panel(f"study-relation-{findings.descriptor}", title, header, findings.points)
 
 
@@ -165,7 +170,7 @@ def relation_panel(experiment: Experiment, predictions: Sequence[PredictionFindi
     from_zero.set_xlabel(f"from 0\n[{quantity.unit}]")
     from_zero.spines["bottom"].set_visible(False)
     name, title = f"relation-{experiment.name}", f"Predicted {quantity.label} against score of {experiment.name}"
-    header = ("index", "mean score", "95 % interval low", "95 % interval high", "own score")
+    header = ("index", *_in_points("mean score", "95 % interval low", "95 % interval high", "own score"))
     header += (f"{quantity.label} [{quantity.kept_unit}]", f"error estimate of {quantity.label} [-]")
     interval = f"95 % interval of {quantity.label} by friction"
     header += (f"{interval}, low [{quantity.kept_unit}]", f"{interval}, high [{quantity.kept_unit}]")
