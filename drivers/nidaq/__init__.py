@@ -33,6 +33,7 @@ _NAP = 0.005  # between two polls for readings [real s]
 _OPTIONS = frozenset({"cal", "rate"})
 _EXAMPLE = "nidaq://Dev1?cal=FILE"
 _DEFAULT_RATE = 1000  # [Hz]
+LOWEST_RATE, HIGHEST_RATE = 1, 100_000  # [Hz]; six gauges share 1 MS/s of NI's X series, and 250 kS/s of USB-621x
 
 
 def library() -> Any:  # noqa: ANN401 - optional
@@ -52,7 +53,7 @@ def open_nidaq(address: Address, clock: Clock, deadline: Deadline) -> StreamingT
     check_form(address, _EXAMPLE, _OPTIONS)
     api = library()
     device, info = _device_info(api, address)
-    rate = address.number("rate", _DEFAULT_RATE, 1, 100_000)
+    rate = address.number("rate", _DEFAULT_RATE, LOWEST_RATE, HIGHEST_RATE)
     link = _TaskLink(api, device, rate)
     link.close()
     return StreamingTransducer(

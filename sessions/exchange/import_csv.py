@@ -14,6 +14,7 @@ from drivers.arrays import Array
 from drivers.calibration import Calibration
 from drivers.calibration_file import AXES
 from drivers.clock import StillClock
+from drivers.nidaq import HIGHEST_RATE, LOWEST_RATE
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.exchange.csv_text import COMMENT, ImportRefused, cell_text, content_of, mend_row, number_in, records
@@ -149,7 +150,7 @@ RATE_TOLERANCE = 0.01  # relative difference allowed between a stated rate and t
 UNEVEN = 0.05  # relative spread of time steps from which there is no single rate [-]
 _FEWEST = 2
 _LONGEST = 9e9  # of a recording [s]: a session's clock counts nanoseconds in 64 bits
-FASTEST = 1e6  # readings a second [Hz]: ten times the fastest supported device
+FASTEST = 10.0 * HIGHEST_RATE  # readings a second [Hz]: ten times the fastest supported device
 GREATEST = 1e18  # of a time, force or torque: a thousand times the microseconds since 1970, and no product overflows
 _SIMULATED = "SIMULATED"  # at the head of files from a simulator
 
@@ -188,6 +189,7 @@ class ImportResult:
     defaults: tuple[str, ...]  # values nobody stated, a sentence each
     extra: tuple[str, ...]  # columns kept only in the original file
     renamed: tuple[str, ...] = ()  # columns read as another axis than their heading names
+    doubt: str | None = None  # about the rate
 
 
 def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -> ImportResult:
@@ -237,7 +239,8 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
     writer.readings(block)
     writer.event("ended", data={"reason": "the file ends", "cause": "finished", "readings": len(block)})
     writer.close()
-    return ImportResult(folder, len(block), rate, _defaults(frame), layout.extra, layout.renamed)
+    doubt = _doubt_of_rate(path, layout, rate)
+    return ImportResult(folder, len(block), rate, _defaults(frame), layout.extra, layout.renamed, doubt)
 
 
 def _table(path: Path, content: bytes, options: ImportOptions) -> tuple[Columns, Array, list[int]]:
@@ -312,6 +315,19 @@ def _times(
                 "leave --rate out, or name the columns with --axes so that its times are not used"
             )
     return time - time[0], rate, "measured"
+
+
+def _doubt_of_rate(path: Path, layout: Columns, rate: float) -> str | None:
+    """Return a sentence about a rate that no supported device has; all others lie within the range of `nidaq://`."""
+    if LOWEST_RATE * (1.0 - RATE_TOLERANCE) <= rate <= HIGHEST_RATE * (1.0 + RATE_TOLERANCE):
+        return None
+    limit = f"more than any supported device's {HIGHEST_RATE}"
+    if rate < LOWEST_RATE:
+        limit = f"fewer than any supported device's {LOWEST_RATE}"
+    source, remedy = "--rate states", "give the right --rate"
+    if layout.time is not None:
+        source, remedy = f"its times, taken as {layout.time_unit}, hold", "correct their unit in the header"
+    return f"{path}: {source} {rate:.6g} readings a second, {limit}: if that is wrong, {remedy} and import again"
 
 
 def _says_simulated(content: bytes, names: Sequence[str]) -> bool:

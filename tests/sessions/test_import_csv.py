@@ -95,6 +95,26 @@ def test_the_rate_is_that_of_the_file_and_says_so(tmp_path):
     assert recording.provenance["settings"]["rate"]["origin"] == "measured"
 
 
+@pytest.mark.parametrize(
+    ("header", "factor", "sentence"),
+    [
+        (HEADER.replace("t_s", "t_ms"), 0.5, "taken as ms, hold 200000 readings a second, more than"),
+        (HEADER, 500.0, "taken as s, hold 0.2 readings a second, fewer than"),
+        (HEADER, 1e-3, None),  # the highest rate of a supported device
+        (HEADER.replace("t_s", "t_ms"), 1e5, None),  # and the lowest
+    ],
+)
+def test_a_rate_that_no_supported_device_has_is_taken_and_doubted(tmp_path, header, factor, sentence):
+    rows = [f"{factor * i / 100:.12g},0.1,{i},-2.5,0.01,0.02,-0.03" for i in range(20)]
+    result, recording = import_file(tmp_path, header=header, rows=rows)
+    assert len(recording.readings()) == result.readings == 20
+    if sentence is None:
+        assert result.doubt is None
+    else:
+        assert sentence in result.doubt
+        assert result.doubt.endswith("if that is wrong, correct their unit in the header and import again")
+
+
 def test_the_recording_ends_and_has_no_losses(tmp_path):
     _, recording = import_file(tmp_path)
     assert recording.losses == ()

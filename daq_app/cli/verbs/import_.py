@@ -99,6 +99,7 @@ def _import_foreign(folder: Path, options: argparse.Namespace, console: Console)
         list_in_manifest(summary.folder, (ORIGINAL_FILE,))
     document = asdict(summary)
     console.result(session=str(document.pop("folder")), **document)
+    console.note(None if summary.doubt is None else f"doubtful: {summary.doubt}")
     console.say(
         f"{summary.folder}: {summary.readings} readings at {number(summary.rate, 4)} per second",
         *(f"default: {default}" for default in summary.defaults),
