@@ -19,7 +19,7 @@ from daq_app.qt.tokens import GRID, missing_glyphs
 from daq_app.recorder.messages import ResumeSession
 from daq_app.window.checklist import Card
 from daq_app.window.new_session import SessionForm, UnfinishedSession, subject_texts, unfinished_sessions
-from daq_app.window.state import Message
+from daq_app.window.state import Message, TransducerHolders
 from daq_app.window.subject import LENGTH, SubjectText, translator
 from daq_app.window.view import BenchView, bench_summary
 from daq_app.wording import tr
@@ -69,6 +69,8 @@ class CutShort(Panel):
     def __init__(self, send: Callable[[Message], None]) -> None:
         super().__init__("", "banner")
         self._items: tuple[UnfinishedSession, ...] = ()
+        self._holders: dict[str, str] = {}
+        self._send = send
         self.setProperty("grade", "look")
         self._sessions = choice(tr("sessions that were cut short"))
         self._description = label("", wrap=True)  # complete, even if the list is narrow
@@ -99,9 +101,14 @@ class CutShort(Panel):
         threading.Thread(target=look, daemon=True).start()
 
     def show_sessions(self, sessions: tuple[UnfinishedSession, ...]) -> None:
-        """Show the sessions that no recorder writes; one that is in use may be free soon."""
-        if any(session.in_use for session in sessions):
+        """Show the sessions that no recorder writes; one that is in use may be free soon, and its transducer too."""
+        in_use = [session for session in sessions if session.in_use]
+        if in_use:
             self._again.start()
+        holders = {session.uri: session.description for session in in_use if session.uri}
+        if holders != self._holders:
+            self._holders = holders
+            self._send(TransducerHolders(holders))
         sessions = tuple(session for session in sessions if not session.in_use)
         if sessions != self._items:
             self._items = sessions

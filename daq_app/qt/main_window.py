@@ -74,6 +74,7 @@ class MainWindow(QMainWindow):
         self.keyboard.nothing_to_give.connect(self._point_to_space)
         self.rooms = Rooms(bridge, self.rail, Menus(self, self.act))
         self.keys = KeysPage(self)
+        self._refused_uri = ""  # address of the transducer whose holder was looked for
         self._acts = self._table()
         self._left = stack_pages(self.page, self.course)
         self.setCentralWidget(self._lay_out())
@@ -95,6 +96,9 @@ class MainWindow(QMainWindow):
     def show_view(self, view: View) -> None:
         course = view.course
         self.header.show_view(view)
+        if (uri := self.bridge.state.bench.refused_uri) != self._refused_uri:
+            self._refused_uri = uri
+            self.page.look_for_unfinished_sessions()  # one of them may hold it
         notice, step = ("", "") if course is None else (course.notice, course.headline)
         self.notice.show_view(view.banner, notice, step)
         self._warn_of_tablet()

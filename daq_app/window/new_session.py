@@ -99,6 +99,7 @@ class UnfinishedSession:
     folder: Path
     description: str
     in_use: bool = False  # a recorder still writes it: of another window, or of one that is gone
+    uri: str = ""  # address of its transducer; "" without one
 
 
 def bench_of(bench: BenchState) -> Bench:
@@ -279,7 +280,8 @@ def unfinished_sessions(folder: Path) -> tuple[UnfinishedSession, ...]:
             "{subject}, {begun}: trials done {done} of {count}",
             subject=subject, begun=start, done=number, count=len(trials),
         )  # fmt: skip
-        unfinished.append(UnfinishedSession(file.parent, description, in_use))
+        uri = "" if recording.info is None else recording.info.uri
+        unfinished.append(UnfinishedSession(file.parent, description, in_use, uri))
     return tuple(unfinished)
 
 

@@ -1,5 +1,6 @@
 """The window's state, one frozen dataclass, and its changes by each message. No Qt, no clock, no file."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -44,6 +45,12 @@ class LifeKnown(Struct, frozen=True):
     life: Life | None
 
 
+class TransducerHolders(Struct, frozen=True):
+    """Transducers of unfinished sessions that a recorder still writes."""
+
+    sessions: dict[str, str]  # in words, by the transducer's address
+
+
 class Dismissed(Struct, frozen=True):
     """The experimenter has dismissed the message of a failure."""
 
@@ -65,7 +72,8 @@ class LanguageChosen(Struct, frozen=True):
 
 
 Own = (
-    Tick | Searching | DevicesFound | LifeKnown | Judged | Dismissed | NewSession | DrawingFailed | LanguageChosen
+    Tick | Searching | DevicesFound | LifeKnown | Judged | TransducerHolders | Dismissed | NewSession | DrawingFailed
+    | LanguageChosen
 )  # fmt: skip
 Message = m.Request | m.Report | Own  # messages of `fold`
 
@@ -89,6 +97,7 @@ class BenchState:
     info: TransducerInfo | None = None
     frame: Frame | None = None  # of a simulated or recorded bench
     problem: str | None = None  # why the link is lost or failed
+    refused_uri: str = ""  # address of a transducer that could not be opened
     searching: bool = False
     searched: bool = False  # a search has ended since the last connecting or disconnecting
     devices: tuple[Probe, ...] = ()
@@ -110,10 +119,10 @@ def _fold_link(bench: BenchState, message: Message) -> BenchState:
             return BenchState(link="connecting", uri=uri, devices=bench.devices)
         case m.Device(info, frame):
             return replace(bench, link="open", info=info, frame=frame, uri=info.uri, problem=None, life=None)
-        case m.NoDevice():
+        case m.NoDevice() if bench.link != "connecting":  # else the former one makes room
             return BenchState(devices=bench.devices, problem=bench.problem)
         case m.Failed("Connect", sentence):
-            return BenchState(devices=bench.devices, problem=sentence)
+            return BenchState(devices=bench.devices, problem=sentence, refused_uri=bench.uri)
         case m.LinkDown(sentence):
             return replace(bench, link="lost", problem=sentence)
         case m.LinkBack(same=True):
@@ -178,6 +187,12 @@ class AppState:
     exit_reason: str | None = None  # why the recorder's process has ended
     drawing_error: str | None = None  # of a picture
     language: str = ENGLISH  # of the next session's subject, as chosen
+    holders: Mapping[str, str] = field(default_factory=dict)  # other recorders' sessions, by transducer address
+
+    @property
+    def holder(self) -> str:
+        """Return the session whose recorder holds the transducer that could not be opened; "" if none does."""
+        return self.holders.get(self.bench.refused_uri, "")
 
 
 def fold(state: AppState, message: Message) -> AppState:
@@ -190,6 +205,8 @@ def fold(state: AppState, message: Message) -> AppState:
     session = state.session and session_after(state.session, message, state.now)
     if bench is not state.bench or session is not state.session:
         state = replace(state, bench=bench, session=session)
+    if isinstance(message, TransducerHolders):
+        return _fold_holders(state, message.sessions)
     return _fold_window(state, message)
 
 
@@ -215,3 +232,12 @@ def _fold_window(state: AppState, message: Message) -> AppState:
             return replace(state, language=language)
         case _:
             return state
+
+
+def _fold_holders(state: AppState, sessions: Mapping[str, str]) -> AppState:
+    """Return the state with these holders of transducers; it says so if they let go of the one that was refused."""
+    after = replace(state, holders=sessions)
+    if not state.holder or after.holder:
+        return after
+    problem = tr("the recorder that held it has let it go; connect again, or resume its session")
+    return replace(after, failure=None, bench=replace(state.bench, problem=problem, refused_uri=""))

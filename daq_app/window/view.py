@@ -14,6 +14,7 @@ from daq_app.window.view_course import CourseView, course_view
 from daq_app.wording import COUNT_LABELS, number, quantity, sentence, tr, tr_noop
 from drivers.calibration_file import AXES
 from drivers.transducer import TransducerInfo
+from sessions.recording.recovery import LIFT_PATIENCE
 
 HEALTH_NAMES = tr_noop(("zeros", "moved", "noise", "overloads"))
 _UNITS = ("N", "N", "N", "N mm", "N mm", "N mm")
@@ -344,16 +345,31 @@ def _banner(state: AppState) -> Banner | None:
         axes = ", ".join(tr(axis) for axis in overloads)
         warning = tr("Overload on {axes}: take the load off and check the transducer.", axes=axes)
         return Banner("wrong", warning, tr("Acknowledge"), m.AcknowledgeOverloads())
-    if (failure := state.failure) is not None:
-        text = tr("The session was not resumed: {why}", why=failure.sentence)
-        text = sentence(text if failure.request == "ResumeSession" else failure.sentence)
-        return Banner("look", text, tr("Dismiss"), Dismissed())
+    if (failed := _failed_request(state)) is not None:
+        return failed
     if state.drawing_error is not None:
         warning = tr("Part of the window failed ({problem}); the recording continues.", problem=state.drawing_error)
         return Banner("look", warning, tr("Dismiss"), Dismissed())
     if bench.link == "none" and bench.problem is not None:
         return Banner("look", tr("No transducer: {problem}", problem=bench.problem))
     return None
+
+
+def _failed_request(state: AppState) -> Banner | None:
+    """Return what the last failed request says; None if there is none."""
+    if state.holder:
+        text = tr(
+            "The recorder of another session ({session}) holds this transducer. If its window is gone, it ends when "
+            "the finger has lifted, after {patience:.0f} s at most. Then connect again, or resume that session.",
+            session=state.holder,
+            patience=LIFT_PATIENCE,
+        )
+        return Banner("look", text)
+    if (failure := state.failure) is None:
+        return None
+    text = tr("The session was not resumed: {why}", why=failure.sentence)
+    text = sentence(text if failure.request == "ResumeSession" else failure.sentence)
+    return Banner("look", text, tr("Dismiss"), Dismissed())
 
 
 def _no_readings(bench: BenchState, *, running: bool) -> str:

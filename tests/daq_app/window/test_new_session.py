@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from killed_process import fork, kill, lines_of
-from recordings import PLAN, TRIAL, new_writer
+from recordings import INFO, PLAN, TRIAL, new_writer
 
 from daq_app.recorder.messages import People, StartSession
 from daq_app.window.new_session import (
@@ -120,7 +120,9 @@ def test_a_session_that_another_window_records_is_not_said_to_be_cut_short(tmp_p
 
     process, reports = fork(record)
     assert lines_of(reports, 1)
-    assert [session.in_use for session in unfinished_sessions(tmp_path)] == [True]
+    (session,) = unfinished_sessions(tmp_path)
+    assert session.in_use
+    assert session.uri == INFO.uri
     kill(process)
     assert [(session.folder, session.in_use) for session in unfinished_sessions(tmp_path)] == [
         (tmp_path / "P01", False)

@@ -29,7 +29,16 @@ from session_messages import (
 
 from daq_app.recorder import messages as m
 from daq_app.recorder.device_history import Life
-from daq_app.window.state import AppState, Dismissed, DrawingFailed, Judged, LifeKnown, NewSession, Tick
+from daq_app.window.state import (
+    AppState,
+    Dismissed,
+    DrawingFailed,
+    Judged,
+    LifeKnown,
+    NewSession,
+    Tick,
+    TransducerHolders,
+)
 from daq_app.window.view import derive_view
 from drivers.transducer import Health
 from sessions.plan.plan import Frame, Visibility
@@ -213,6 +222,26 @@ def test_a_disk_that_took_no_more_is_reported_with_what_is_safe_once():
     end = replace(LOST, cause="disk", reason=reason)
     banner = derive_view(after(*MOUNT, m.SessionEnded("recordings/P07", end, True))).banner
     assert banner.sentence == f"The session was cut short: {reason}."
+
+
+def test_a_transducer_that_another_session_s_recorder_holds_is_refused_with_its_name_until_it_is_free():
+    port, other = "serial-ft:///dev/ttyUSB0", "serial-ft:///dev/ttyUSB1"
+    refusal = after(
+        m.Device(INFO, None),
+        m.Connect(port),
+        m.NoDevice(),
+        m.Failed("Connect", f"{port}: another program has it; end that program"),
+    )
+    assert (
+        "another program has it" in derive_view(after(TransducerHolders({other: "P08"}), state=refusal)).banner.sentence
+    )
+    busy = after(TransducerHolders({port: "P07, begun at 14:30"}), state=refusal)
+    sentence = derive_view(busy).banner.sentence
+    assert sentence.startswith("The recorder of another session (P07, begun at 14:30) holds this transducer.")
+    assert "after 10 s at most. Then connect again, or resume that session." in sentence
+    free = derive_view(after(TransducerHolders({}), state=busy)).banner.sentence
+    assert "let it go; connect again, or resume its session" in free
+    assert derive_view(after(m.Connect(port), state=busy)).banner is None
 
 
 def test_a_calm_bench_shows_no_banner():
