@@ -61,7 +61,7 @@ def exclusion_of(exclusions: tuple[Exclusion, ...], subject: str, descriptor: st
     return next((exclusion for exclusion in of_subject if exclusion.descriptor in ("", descriptor)), None)
 
 
-FORM = 13  # version of rows; stored rows of another version are computed again
+FORM = 14  # version of rows; stored rows of another version are computed again
 STILL_BLINDED = "still blinded, and is not counted until 'daq-app unblind' opens the key"
 NO_INTERVAL = "intervals of the SED were not requested"
 
@@ -70,7 +70,7 @@ NO_INTERVAL = "intervals of the SED were not requested"
 class VisitOptions:
     """Options for the analysis of each session of a study."""
 
-    prediction: PredictionOptions = field(default_factory=lambda: PredictionOptions(course="steady", intervals=True))
+    prediction: PredictionOptions = field(default_factory=lambda: PredictionOptions(intervals=True))
     area: AreaLaw = FIXED  # for tau_max; paths have their own areas
     # Whether to follow many paths, and at which strain: see `sessions.statistics.multiverse`
     paths: Literal["none", "small", "finite"] = "none"

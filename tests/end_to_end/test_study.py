@@ -26,7 +26,7 @@ from sessions.recording import RecordingError
 from sessions.recording.head import software_versions
 from sessions.statistics.visit import Visit, VisitOptions
 
-STEADY = VisitOptions()
+DEFAULT = VisitOptions()
 QUICK = VisitOptions(PredictionOptions(course="steady"))
 
 
@@ -51,6 +51,15 @@ def rows(pool, subject):
 def test_the_damaged_session_is_named_and_stops_nothing(pool):
     assert [name for name, _ in pool["failed"]] == ["S11"]
     assert [visit["session"] for visit in pool["visits"]] == ["S01", "S02"]
+
+
+def test_the_predictions_of_a_study_are_those_that_its_sessions_sealed(study, tmp_path, capsys):
+    session = shutil.copytree(study / "S01", tmp_path / "S01")
+    assert run(["predict", str(session), "--seal", "--json"]) == 0
+    sealed = json.loads(capsys.readouterr().out)["trials"]
+    visit = msgspec.convert(compute_visit(session, DEFAULT), Visit)
+    assert visit.sealed.endswith("the predictions shown are those.")
+    assert [row.sed for row in visit.rows] == pytest.approx([row["sed"] for row in sealed], rel=1e-12)
 
 
 def test_a_command_that_mends_a_session_holds_from_the_current_folder(study, tmp_path, capsys, monkeypatch):
@@ -118,7 +127,7 @@ def test_what_was_computed_once_is_not_computed_again(pool, study, monkeypatch):
 
     monkeypatch.setattr(pooling, "_in_pool", never)
     results, failures = visits(
-        [study / "S01", study / "S02"], STEADY, Shelf(study / "pooled" / "results", STEADY), Console(as_json=True)
+        [study / "S01", study / "S02"], DEFAULT, Shelf(study / "pooled" / "results", DEFAULT), Console(as_json=True)
     )
     assert not failures
     assert {visit.session for visit in results} == {visit["session"] for visit in pool["visits"]}
@@ -127,14 +136,14 @@ def test_what_was_computed_once_is_not_computed_again(pool, study, monkeypatch):
 @pytest.mark.parametrize("damage", [b"", b"{", b"[]", b'{"a": 1}', "digit"])
 def test_what_was_kept_and_is_not_as_it_was_written_is_named_and_computed_anew(pool, study, tmp_path, damage, capsys):
     visit = next(visit for visit in pool["visits"] if visit["session"] == "S01")
-    shelf = Shelf(tmp_path, STEADY)
+    shelf = Shelf(tmp_path, DEFAULT)
     key = shelf.key(study / "S01")
     shelf.keep(key, visit)
     whole = shelf.file(key).read_bytes()
     shelf.file(key).write_bytes(whole.replace(b'"mu": 0.', b'"mu": 9.', 1) if damage == "digit" else damage)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pooling, "_in_pool", lambda *_: iter([("S01", visit)]))
-        results, _ = visits([study / "S01"], STEADY, shelf, Console(as_json=True))
+        results, _ = visits([study / "S01"], DEFAULT, shelf, Console(as_json=True))
     assert results[0].rows[0].mu == visit["rows"][0]["mu"]
     assert f"{key}.json is damaged; the session is computed again" in capsys.readouterr().err
     assert shelf.file(key).read_bytes() == whole
@@ -145,7 +154,7 @@ def test_a_full_disk_ends_a_study_in_a_sentence_and_leaves_no_part_of_a_file(tmp
     def full(_):
         return Path("/dev/full").open("wb")
 
-    shelf = Shelf(tmp_path, STEADY)
+    shelf = Shelf(tmp_path, DEFAULT)
     monkeypatch.setattr(file_access, "open_new", full)
     with pytest.raises(RecordingError, match=r"cannot be written \(No space left on device\): free space"):
         shelf.keep("key", {})
@@ -154,7 +163,7 @@ def test_a_full_disk_ends_a_study_in_a_sentence_and_leaves_no_part_of_a_file(tmp
 
 
 def test_another_recording_or_other_options_are_another_key(study):
-    shelf = Shelf(study, STEADY)
+    shelf = Shelf(study, DEFAULT)
     assert shelf.key(study / "S01") != shelf.key(study / "S02")
     as_printed = VisitOptions(PredictionOptions(tau_reading="as-printed"))
     assert shelf.key(study / "S01") != Shelf(study, as_printed).key(study / "S01")
@@ -162,7 +171,7 @@ def test_another_recording_or_other_options_are_another_key(study):
 
 
 def test_a_session_whose_files_are_sent_gives_the_same_bits_as_one_on_the_disk(pool, study):
-    remote = compute_sent_visit("S01", content_of(study / "S01"), STEADY)
+    remote = compute_sent_visit("S01", content_of(study / "S01"), DEFAULT)
     local = next(visit for visit in pool["visits"] if visit["session"] == "S01")  # from the disk, by another process
     assert json.loads(json.dumps(remote)) == local
 
@@ -239,12 +248,12 @@ def test_a_dask_cluster_gives_the_same_bits_as_this_computer(study, tmp_path):
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as workers:
         far, _ = visits(
             [study / "S01", study / "S02"],
-            STEADY,
-            Shelf(tmp_path, STEADY),
+            DEFAULT,
+            Shelf(tmp_path, DEFAULT),
             Console(as_json=True),
             scheduler=workers.scheduler_address,
         )
-    here = [msgspec.convert(compute_visit(study / name, STEADY), Visit) for name in ("S01", "S02")]
+    here = [msgspec.convert(compute_visit(study / name, DEFAULT), Visit) for name in ("S01", "S02")]
     assert sorted(far, key=lambda visit: visit.session) == here
 
 
@@ -253,7 +262,7 @@ def test_a_cluster_without_workers_is_given_up_in_a_sentence(study, tmp_path, mo
     import distributed
 
     monkeypatch.setattr(pooling, "WITHOUT_WORKERS", 0.5)
-    arguments = ([study / "S01"], STEADY, Shelf(tmp_path, STEADY), Console(as_json=True))
+    arguments = ([study / "S01"], DEFAULT, Shelf(tmp_path, DEFAULT), Console(as_json=True))
     with (
         distributed.LocalCluster(n_workers=0, dashboard_address=None) as workers,
         pytest.raises(pooling.SchedulerError, match="no worker"),
@@ -295,7 +304,7 @@ def test_a_scheduler_that_is_killed_ends_a_study_in_a_sentence(study, tmp_path, 
             address = json.loads(file.read_text())["address"]
             monkeypatch.setattr(pooling, "cluster_client", client_without_scheduler)
             with pytest.raises(pooling.SchedulerError, match="the scheduler is gone"):
-                visits([study / "S01"], STEADY, Shelf(tmp_path, STEADY), Console(as_json=True), scheduler=address)
+                visits([study / "S01"], DEFAULT, Shelf(tmp_path, DEFAULT), Console(as_json=True), scheduler=address)
         finally:
             scheduler.kill()
 
@@ -341,7 +350,7 @@ def test_a_worker_of_another_version_that_joins_later_is_refused(study, tmp_path
     monkeypatch.setattr(pooling, "refuse_other_workers", check_workers)
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster_of:
         folders = [study / "S01", study / "S02"]
-        call = (folders, STEADY, Shelf(tmp_path, STEADY), Console(as_json=True))
+        call = (folders, DEFAULT, Shelf(tmp_path, DEFAULT), Console(as_json=True))
         with pytest.raises(pooling.SchedulerError, match=r"computes with .*numpy 1\.0"):
             visits(*call, scheduler=cluster_of.scheduler_address)
     assert len(names) == 2
@@ -356,8 +365,8 @@ def test_what_another_version_computed_is_refused_in_a_sentence_and_not_mixed_in
 
 @pytest.mark.usefixtures("pool")
 def test_a_cluster_is_not_asked_for_what_is_kept(study):
-    shelf = Shelf(study / "pooled" / "results", STEADY)
-    results, failures = visits([study / "S01"], STEADY, shelf, Console(as_json=True), scheduler="tcp://127.0.0.1:9")
+    shelf = Shelf(study / "pooled" / "results", DEFAULT)
+    results, failures = visits([study / "S01"], DEFAULT, shelf, Console(as_json=True), scheduler="tcp://127.0.0.1:9")
     assert ([visit.session for visit in results], failures) == (["S01"], [])
 
 

@@ -201,7 +201,7 @@ def _pool(options: argparse.Namespace, folder: Path, output: Path, console: Cons
     if not sessions:
         raise RecordingError(f"{folder} holds no session: give the folder that holds a folder for each of them")
     intervals = options.kinematics == "small" if options.intervals is None else options.intervals
-    model = PredictionOptions(options.tau, course="steady", kinematics=options.kinematics, intervals=intervals)
+    model = PredictionOptions(options.tau, kinematics=options.kinematics, intervals=intervals)
     along = options.quantity if options.paths != "none" else SED.name
     visit_options = VisitOptions(model, area_law(options) or FIXED, options.paths, options.calibration_error, along)
     # Errors in these files are reported before hours of work.
