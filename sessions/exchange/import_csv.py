@@ -311,8 +311,9 @@ def _times(
             )
         if abs(options.rate / rate - 1.0) > RATE_TOLERANCE:
             raise SettingsError(
-                f"{path}: --rate {options.rate:g} is refused, as the file's times hold {rate:.4g} readings a second; "
-                "leave --rate out, or name the columns with --axes so that its times are not used"
+                f"{path}: --rate {options.rate:g} is refused, as the file's times, taken as {layout.time_unit}, hold "
+                f"{rate:.6g} readings a second; leave --rate out, correct their unit in the header, or name the "
+                "columns with --axes so that its times are not used"
             )
     return time - time[0], rate, "measured"
 

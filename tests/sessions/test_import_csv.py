@@ -211,6 +211,10 @@ def test_two_columns_for_one_axis_are_refused():
 
 def test_a_rate_the_file_does_not_hold_is_refused(tmp_path):
     assert "hold 100 readings a second" in refusal(tmp_path, SettingsError, ImportOptions(rate=200.0))
+    header, rows = HEADER.replace("t_s", "t_ms"), [f"{i / 200},0.1,{i},-2.5,0,0,0" for i in range(20)]
+    sentence = refusal(tmp_path, SettingsError, ImportOptions(rate=200.0), header=header, rows=rows)
+    assert "taken as ms, hold 200000 readings a second" in sentence
+    assert "correct their unit in the header" in sentence
 
 
 def test_a_rate_the_file_does_hold_is_taken(tmp_path):
