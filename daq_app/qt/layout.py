@@ -58,9 +58,8 @@ def stack_pages(*pages: QWidget) -> QStackedWidget:
 def scroll_area(inside: QWidget, area: QScrollArea | None = None) -> QScrollArea:
     """Return a frameless scroll area, a new one unless given, around `inside`."""
     area = area or QScrollArea()
+    inside.setObjectName("inside")
     area.setWidget(inside)
     area.setWidgetResizable(True)
     area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    inside.setObjectName("inside")
-    area.setStyleSheet("QScrollArea, QWidget#inside { background: transparent; border: none; }")
     return area

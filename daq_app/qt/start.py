@@ -73,9 +73,9 @@ def window(arguments: list[str]) -> int:
         from daq_app.qt.tokens import preferred_tokens
 
         tokens = preferred_tokens()
-        _apply_theme(application, tokens)
         remember_session(folder)
         window = AnalystWindow(folder, tokens)
+        _apply_theme(application, tokens)
         resize_to_hint(window)
         return window
 
@@ -152,10 +152,10 @@ def open_window(
         _apply_theme(application, preferred_tokens())
 
     application.setQuitOnLastWindowClosed(False)
-    follow_theme()
     bridge = Bridge(recorder, start or Recorder.start)
     bridge.connecting(SIMULATED_BENCH)
     window = MainWindow(bridge, tablet)
+    follow_theme()  # after all parts are in place: each move to another parent styles a part and all inside it again
     window.theme_chosen.connect(follow_theme)
     application.styleHints().colorSchemeChanged.connect(follow_theme)
 

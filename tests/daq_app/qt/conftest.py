@@ -116,6 +116,7 @@ def no_window_stays(application):
         if type(widget).__module__.startswith("daq_app.") and widget.parent() is None:
             widget.deleteLater()
     application.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    application.setStyleSheet("")  # as before a first window
     gc.unfreeze()  # an opening window keeps all there is from collection
     gc.collect()
     gc.freeze()

@@ -72,6 +72,7 @@ def test_words_take_the_lines_they_need_at_the_width_they_have_now(keeps):
 @pytest.mark.parametrize(("height", "scrolled"), [(1000, False), (500, True)])
 def test_every_key_is_seen_at_once_where_the_window_has_room_for_the_list(application, height, scrolled):
     window = QMainWindow()
+    window.setStyleSheet(tokens.style_sheet(tokens.LIGHT))
     window.resize(1280, height)
     window.show()
     keys = KeysPage(window)
