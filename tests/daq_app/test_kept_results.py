@@ -107,11 +107,12 @@ def test_a_study_writes_over_no_file_of_somebody_else(small, tmp_path, capsys, n
     assert [(file.name, file.read_text()) for file in out.iterdir()] == [(name, "mine\n")]  # before hours of work
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_study_replaces_its_own_files_and_no_other(small, tmp_path):
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / "notes.txt").write_text("mine\n")
     for _ in range(2):
-        assert run(["study", str(small.parent), "--out", str(tmp_path / "results"), "--workers", "1"]) == 0
+        assert run(["study", str(small.parent), "--out", str(tmp_path / "results")]) == 0
     assert (tmp_path / "results" / "notes.txt").read_text() == "mine\n"
 
 

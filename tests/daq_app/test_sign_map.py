@@ -111,6 +111,7 @@ def test_answers_that_cannot_be_kept_where_somebody_says_are_reported_with_what_
     assert "cannot be used (No such file or directory); check its name" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_the_verb_prints_signs_map_shares_and_indices(tmp_path, capsys):
     keep = str(tmp_path / "keep.jsonl")
     assert run(["sensitivity", "--samples", "2", "--workers", "1", "--keep", keep, "--json"]) == 0

@@ -9,6 +9,7 @@ from examples import short_protocol
 from daq_app.cli.main import run
 from sessions.recording import Recording
 
+pytestmark = pytest.mark.usefixtures("in_this_process")
 TWO = short_protocol("two", "Two surfaces", [0], [0])
 
 

@@ -62,6 +62,7 @@ def test_the_predictions_of_a_study_are_those_that_its_sessions_sealed(study, tm
     assert [row.sed for row in visit.rows] == pytest.approx([row["sed"] for row in sealed], rel=1e-12)
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_command_that_mends_a_session_holds_from_the_current_folder(study, tmp_path, capsys, monkeypatch):
     session = shutil.copytree(study / "S01", tmp_path / "damaged" / "S01")
     (session / "session.sqlite").chmod(0o600)
