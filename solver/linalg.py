@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from solver._kernels import bind_arguments, multifrontal
-from solver.arrays import Array, Factors, Flags, Indices, Narrow, SymbolicFactorization
+from solver.arrays import Array, ElementSystem, Factors, Flags, Indices, Narrow, SymbolicFactorization
 from solver.mesh import Mesh, distinct
 
 
@@ -291,3 +291,59 @@ class Elimination:
         `condensed_force` (n,) is the result of `condense`.
         """
         self._displace(condensed_force, np.ascontiguousarray(skin), *subset, out)
+
+
+CondensedLoad = tuple[Array, Array]  # a load after forward elimination (n,), and centres' displacements (e, 2) under it
+
+
+class StaticCondensation:
+    """A body's tangent, condensed to x, y of the k nodes of its skin; valid until it is factorised again."""
+
+    def __init__(self, mesh: Mesh, inside: Elimination, system: ElementSystem) -> None:
+        """Store the factors `inside`, and the elimination of the elements' centres in `system`."""
+        self.mesh, self._inside, self.stiffness = mesh, inside, inside.stiffness
+        self._inverse, self._recovery_matrix = system.condensed_inverse, system.recovery_matrix[:, :, :16].copy()
+        self.no_load: CondensedLoad = np.zeros(inside.plan.size), np.zeros((len(self._inverse), 2))
+        self._subsets: dict[bytes | None, tuple[Indices, ElementSubset]] = {}
+
+    def condense(self, loads: Array) -> CondensedLoad:
+        """Return dead `loads` (nodes, 2) after forward elimination."""
+        mesh, plan = self.mesh, self._inside.plan
+        centre = loads[mesh.elements[:, 8], :, None]
+        of_centres = (self._inverse[:, [[0, 1], [1, 2]]] @ centre)[:, :, 0]
+        from_centre = (np.swapaxes(self._recovery_matrix, 1, 2) @ centre)[:, :, 0]  # (e, 16)
+        free = plan.unknown >= 0
+        force = np.zeros(plan.size)
+        force[plan.unknown[free]] = -loads[mesh.elements[:, :8]].reshape(-1, 16)[free]
+        np.add.at(force, plan.unknown[free], from_centre[free])
+        self._inside.condense(force)
+        return force, of_centres
+
+    def skin_load(self, load: CondensedLoad) -> Array:
+        """Return a load condensed to the skin (2 k,), 0 where the skin is held."""
+        return np.where(self.mesh.driven[self.mesh.skin].ravel(), 0.0, -load[0][len(load[0]) - len(self.stiffness) :])
+
+    def displacement(self, skin: Array, load: CondensedLoad, only: Indices | None = None) -> Array:
+        """Return the displacements (nodes, 2, c) by back substitution of the skin's (2 k, c) under a load.
+
+        With `only` (node numbers), other nodes may be left at 0.
+        """
+        elements, subset = self._elements_of(only)
+        out = np.zeros((*self.mesh.nodes.shape, skin.shape[1]))
+        self._inside.displace(load[0], skin.T, subset, out)
+        out[subset.nodes[:, 8]] += load[1][elements, :, None]
+        return out
+
+    def _elements_of(self, only: Indices | None) -> tuple[Indices, ElementSubset]:
+        """Return the elements that hold the nodes `only`, or all elements."""
+        key = None if only is None else only.tobytes()
+        if key not in self._subsets:
+            flags = np.full(len(self.mesh.nodes), only is None)
+            flags[only] = True
+            elements = np.flatnonzero(flags[self.mesh.elements].any(axis=1))
+            nodes = self.mesh.elements[elements].astype(np.int32)
+            unknown = self._inside.plan.unknown[elements].reshape(-1, 8, 2)
+            every = np.ones(len(self._inside.plan.start), bool)
+            parts = every if only is None else self._inside.parts_holding(unknown)
+            self._subsets[key] = elements, ElementSubset(parts, nodes, unknown, self._recovery_matrix[elements])
+        return self._subsets[key]

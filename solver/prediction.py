@@ -79,7 +79,7 @@ class NestedNumbers:
     row: Array  # (r,) SED of the row of receptors [MPa]
     row_edge_errors: Array  # (2, m, r) such bounds for `row`
     factor: float  # on the change to these numbers, in the error estimates
-    sed_bound: float = 0.0  # least error of the SED, but for edges, where its parts cancel in the change [MPa]
+    bounds: Array  # (COUNT,) of errors but for edges, where parts of the mesh cancel in the change; 0 without a bound
     shares: Array | None = None  # (a + b,) of each column and row of the mesh in the SED's error, where it is too large
 
 

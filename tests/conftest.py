@@ -31,5 +31,6 @@ def pytest_collection():
 def in_this_process(monkeypatch):
     """Compute sessions and fingers in this process: another takes seconds of a core to begin."""
     monkeypatch.setattr(
-        "daq_app.batch.pool._in_pool", lambda work, jobs, _: ((name, work(*given)) for name, given in jobs.items())
+        "daq_app.batch.pool._in_pool",
+        lambda work, jobs, _: ((name, work(*arguments)) for name, arguments in jobs.items()),
     )

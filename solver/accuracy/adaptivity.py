@@ -10,7 +10,7 @@ Meth. Fluids 62, 90). The same holds for rows. The volumetric energy is left out
 incompressible tissue change volume and solutions do not. For refinement the parts are scaled to the estimate from two
 meshes (`solver.accuracy.error_estimate`), which they bound where they cancel in the change.
 
-At finite strain the stiffness of the undeformed body replaces the tangent.
+The mutual energy is that of the undeformed body, at finite strain too.
 """
 
 from dataclasses import dataclass, replace
@@ -19,16 +19,19 @@ from typing import Any
 
 import numpy as np
 
-from solver._kernels import OPEN, SLIP, STICK
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
+from solver._kernels.contact_system import tributary
 from solver.accuracy.convergence_order import change_factor, local_excess, order_of
 from solver.accuracy.error_estimate import NO_NESTED_STATE, PARTS, WIDTH, Steps, edge_errors, errors
 from solver.arrays import Array, Indices
 from solver.body import Patches
 from solver.body.linear import Elastic
 from solver.constitutive import Moduli
+from solver.contact import ForceLoad
 from solver.equilibrium import EquilibriumState
-from solver.equilibrium.finger import Finger, LinearFinger, settled_moduli
+from solver.equilibrium.finger import Finger, settled_moduli
 from solver.equilibrium.load_path import end_of_path
+from solver.equilibrium.load_stepping import forces_of
 from solver.failures import NotConverged
 from solver.mesh import ALONG, OUT, Lines, line
 from solver.mesh.mesher import FINEST, FingerMesh
@@ -51,14 +54,14 @@ QUADRATIC = line(np.linspace(-1.0, 1.0, 5))[0]  # (5, 3) from the nodes of one e
 class NestedGrid:
     """A nested mesh, indexed by the a x b elements that it divides, with 5 x 5 nodes each."""
 
-    finger: LinearFinger
+    finger: Finger[Any]
     nodes: Indices  # (a, b, 5, 5)
     shear: Array  # (a, 2, b, 2, 18, 18) stiffness of the quarters' shear moduli alone
     affine: Array  # (a, b, 25, 3) functions 1, x, y
     fit: Array  # (a, b, 3, 25) their least-squares fit to nodal values
 
     @staticmethod
-    def of(finger: LinearFinger) -> "NestedGrid":
+    def of(finger: Finger[Any]) -> "NestedGrid":
         """Index the nested mesh of a finger."""
         mesh, columns = finger.geometry.mesh, (len(finger.geometry.arcs) - 1) // 2
         rows = len(mesh.elements) // columns // 4
@@ -73,61 +76,99 @@ class NestedGrid:
         fit = np.asarray(np.linalg.solve(transpose @ affine, transpose), np.float64)
         return NestedGrid(finger, nodes, shear, affine, fit)
 
-    def parts(self, displacement: Array, state: EquilibriumState) -> tuple[Array, Array, float]:
-        """Return the parts of columns (a,) and rows (b,) in the change of the SED to this mesh [MPa], with their signs.
+    def parts(
+        self, displacement: Array, state: EquilibriumState, forces: ForceLoad | None = None
+    ) -> tuple[Array, Array, Array]:
+        """Return the signed parts of columns (a, ADJOINTS) and rows (b, ADJOINTS) in the changes to this mesh.
 
-        The third number is the size of the parts of the mesh's corners, where held edges meet free ones. `displacement`
-        (nodes, 2) and the contact states of `state` are those on this mesh.
+        They belong to the first results of `all_numbers`. The third array (ADJOINTS,) is the size of the parts of the
+        mesh's corners, where held edges meet free ones. `displacement` (nodes, 2) and the contact states of `state`
+        under `forces`, if any, are those on this mesh.
         """
-        dual = adjoint(self.finger, displacement, state)
-        primal, dual = (self._curvature(field) for field in (displacement, dual))
-        five = (*self.nodes.shape, 2)
-        columns = [
-            field - (QUADRATIC @ field[:, :, ::2].reshape(*five[:2], 3, 10)).reshape(five) for field in (primal, dual)
-        ]
-        rows = [field - QUADRATIC @ field[:, :, :, ::2] for field in (primal, dual)]
-        by_column, by_row = self._energy(*columns), self._energy(*rows)
-        corners = float(np.sum(np.abs(by_column[CORNERS]) + np.abs(by_row[CORNERS])))
+        fields = (displacement, adjoints(self.finger, displacement, state, forces))
+        u, z = (_differences(self._curvature(field)) for field in fields)
+        by_column, by_row = (self._energy(*pair) for pair in zip(u, z, strict=True))
+        corners = np.sum(np.abs(by_column[CORNERS]) + np.abs(by_row[CORNERS]), axis=(0, 1))
         return by_column.sum(axis=1), by_row.sum(axis=0), corners
 
     def _curvature(self, values: Array) -> Array:
-        """Return nodal values (nodes, 2) by element (a, b, 5, 5, 2), less their best fit by 1, x, y.
+        """Return nodal values (nodes, 2, ...) by element (a, b, 5, 5, 2 c), less their best fit by 1, x, y.
 
         Nodes of the nested mesh lie on the outline, which the element that they divide only approximates.
         """
-        local = values[self.nodes].reshape(*self.affine.shape[:3], 2)
-        return (local - self.affine @ (self.fit @ local)).reshape(*self.nodes.shape, 2)
+        local = values[self.nodes].reshape(*self.affine.shape[:3], -1)
+        return (local - self.affine @ (self.fit @ local)).reshape(*self.nodes.shape, -1)
 
     def _energy(self, u: Array, v: Array) -> Array:
-        """Return the mutual shear energy (a, b) of two fields (a, b, 5, 5, 2)."""
-        out = np.zeros(self.nodes.shape[:2])
+        """Return the mutual shear energies (a, b, c) of the fields `u` (a, b, 5, 5, 2) and `v` (a, b, 5, 5, 2 c)."""
+        a, b = self.nodes.shape[:2]
+        out = np.zeros((a, b, 1, v.shape[-1] // 2))
         for right in (0, 1):
             for up in (0, 1):
-                first, second = (
-                    field[:, :, 2 * right + ALONG, 2 * up + OUT].reshape(*out.shape, 18) for field in (u, v)
-                )
-                out += np.sum(first * (self.shear[:, right, :, up] @ second[..., None])[..., 0], axis=2)
-        return out
+                first, second = (f[:, :, 2 * right + ALONG, 2 * up + OUT].reshape(a, b, 18, -1) for f in (u, v))
+                out += np.swapaxes(first, 2, 3) @ self.shear[:, right, :, up] @ second
+        return out[:, :, 0]
 
 
-def adjoint(finger: LinearFinger, displacement: Array, state: EquilibriumState) -> Array:
-    """Return the derivative (nodes, 2) of the ending's SED with respect to nodal forces, at fixed contact states.
+def _differences(field: Array) -> tuple[Array, Array]:
+    """Return the differences of a `field` (a, b, 5, 5, c) from its quadratic interpolants across columns and rows."""
+    a, b, _, _, c = field.shape
+    across_columns = (QUADRATIC @ field[:, :, ::2].reshape(a, b, 3, 5 * c)).reshape(field.shape)
+    return field - across_columns, field - QUADRATIC @ field[:, :, :, ::2]
 
-    Its unit is MPa mm/N. Where skin slips, its tangential force changes by mu times its normal force, so the normal
-    component of the adjoint is mu times the tangential one, against the friction. Skin that sticks does not move.
+
+ADJOINTS = 4  # results with an adjoint: the first of `Finger.all_numbers`, SED, both forces and depth
+
+
+def adjoints(
+    finger: Finger[Any], displacement: Array, state: EquilibriumState, forces: ForceLoad | None = None
+) -> Array:
+    """Return the derivatives (nodes, 2, ADJOINTS) of results with respect to nodal forces, at fixed contact states.
+
+    `forces` are those that the state is under, or None for a given depth. A result that is given has zeros. They solve
+    the transpose of the linearised contact problem.
+
+    Where skin slips, its tangential force changes by mu times its normal force. So the adjoint's normal component plus
+    mu times the tangential one, in the sense of the friction, is the same on all touching skin. At a given depth it is
+    0, or -1 for the normal force. Under a given normal force the surface's forces on the adjoint sum to 0 instead, or 1
+    for the depth. The same holds for the tangential component where skin sticks, and a given drag.
     """
     goal = finger.ending.gradient(displacement)
     goal[finger.geometry.mesh.driven] = 0.0
-    body, recover = finger.body.with_loads(goal)
-    compliance, free = body.compliance, body.free_displacement().ravel()
-    movable = compliance.diagonal().reshape(-1, 2).all(axis=1)
-    touching, sticking = (np.flatnonzero(movable & which) for which in (state.state != OPEN, state.state == STICK))
+    tangent = finger.body.tangent(state.u, state.pressure)
+    load, stiffness = tangent.condense(goal), tangent.stiffness.copy()
+    movable = stiffness.diagonal() != 0.0
+    stiffness[~movable, ~movable] = 1.0
+    slopes = np.zeros((len(state.state), len(state.state)))
+    if (at_bound := state.state == SHEAR_LIMITED).any():  # their forces change with the lengths of skin
+        lengths = np.zeros((len(at_bound), len(at_bound)))
+        for position, length in zip(np.eye(len(at_bound)), lengths, strict=True):
+            tributary(position, finger.newton.skin.middle, length)
+        slopes = state.load.tau * state.sense * np.where(at_bound, lengths, 0.0)  # of force i by position j, at [j, i]
+        stiffness[::2, ::2] -= slopes
+    free = movable.reshape(-1, 2).all(axis=1)
+    touching, sticking = (np.flatnonzero(free & which) for which in (state.state != OPEN, state.state == STICK))
+    y, x = 2 * touching + 1, 2 * sticking
+    reactions, unit = np.concatenate([y, x]), np.eye(len(stiffness))
     lever = np.where(state.state == SLIP, state.load.mu * state.sense, 0.0)[touching, None]
-    forces = np.concatenate([2 * touching + 1, 2 * sticking])
-    rows = np.column_stack([compliance, free])
-    system = np.concatenate([rows[2 * touching + 1] + lever * rows[2 * touching], rows[2 * sticking]])
-    reactions = np.linalg.lstsq(system[:, forces], -system[:, -1], rcond=None)[0]
-    return recover((free + compliance[:, forces] @ reactions).reshape(-1, 2))
+    constraints = unit[reactions]
+    constraints[: len(y)] += lever * unit[y - 1]
+    motions = np.zeros((len(reactions), 2))  # of the surface along y and x
+    motions[: len(y), :1], motions[: len(y), 1:], motions[len(y) :, 1] = 1.0, lever, 1.0
+    by_force = [forces is not None and len(y) > 0, forces is not None and forces.tangential is not None and len(x) > 0]
+    sums = np.stack([reactions % 2 == 1, reactions % 2 == 0])[by_force]
+    system = np.block([
+        [stiffness, -unit[:, reactions], np.zeros((len(stiffness), len(sums)))],
+        [constraints, np.zeros((len(reactions), len(reactions))), -motions[:, by_force]],
+        [np.zeros((len(sums), len(stiffness))), sums, np.zeros((len(sums), len(sums)))],
+    ])  # fmt: skip
+    right = np.zeros((len(system), ADJOINTS))
+    right[: len(stiffness), 0], right[: len(stiffness) : 2, 2] = tangent.skin_load(load), slopes.sum(axis=1)
+    right[len(stiffness) : len(stiffness) + len(reactions), 1:3] = -motions
+    right[len(system) - len(sums) :, 3] = np.arange(len(sums)) == 0
+    skin = np.asarray(np.linalg.solve(system, right)[: len(stiffness)], np.float64)
+    of_forces = tangent.displacement(np.ascontiguousarray(skin[:, 1:]), tangent.no_load)
+    return np.concatenate([tangent.displacement(skin[:, :1].copy(), load), of_forces], axis=2)
 
 
 FingerState = tuple[Finger[Any], EquilibriumState]
@@ -154,26 +195,27 @@ def nested_numbers(
     if np.isinf(edges).any():
         return NO_NESTED_STATE
     results = values[:COUNT] if steps is None else steps.extrapolate(values[:COUNT])
-    change = abs(float(results[0] - numbers[0]))
-    local = _local_parts(*nested) if scene.solve.kinematics == "finite" else None
-    bound = 0.0 if local is None else change + local_excess(*local, order)
-    outcome = NestedNumbers(results, edges[..., :COUNT], values[COUNT:], edges[..., COUNT:], factor, bound)
+    change, bounds = np.abs(results - numbers), np.zeros(COUNT)
+    local = _local_parts(scene, *nested) if scene.solve.kinematics == "finite" else None
+    if local is not None:
+        bounds[:ADJOINTS] = change[:ADJOINTS] + local_excess(*local, order)
+    outcome = NestedNumbers(results, edges[..., :COUNT], values[COUNT:], edges[..., COUNT:], factor, bounds)
     target = scene.solve.target
     misses_tolerance = target is not None and errors(scene, numbers, outcome, steps).error_estimate > target
     if not misses_tolerance and scene.solve.contrast_tolerance is None:
         return outcome
-    parts, _ = _local_parts(*nested) if local is None else local
-    parts = np.abs(parts)
-    parts *= max(factor * change, bound) / max(float(parts.sum()), np.finfo(float).tiny)
+    parts = np.abs((_local_parts(scene, *nested) if local is None else local)[0][:, 0])
+    parts *= max(factor * change[0], bounds[0]) / max(float(parts.sum()), np.finfo(float).tiny)
     columns = np.concatenate([_columns_of_edges(*state) for state in (answer, nested)])
     np.add.at(parts, columns, edges[edges[..., 0].sum(axis=1).argmax(), :, 0])
     whole = float(parts.sum())
     return replace(outcome, shares=parts / whole if whole > 0.0 else None)
 
 
-def _local_parts(finger: Finger[Any], state: EquilibriumState) -> tuple[Array, float]:
-    """Return `NestedGrid.parts` of a nested state: of columns and rows (a + b,), and of corners [MPa]."""
-    columns, rows, corners = _grid(finger).parts(finger.displacement(state), state)
+def _local_parts(scene: Scene, finger: Finger[Any], state: EquilibriumState) -> tuple[Array, Array]:
+    """Return `NestedGrid.parts` of a nested state: of columns and rows (a + b, ADJOINTS), of corners (ADJOINTS,)."""
+    forces = forces_of(scene, state.load)
+    columns, rows, corners = _grid(finger).parts(finger.displacement(state), state, forces)
     return np.concatenate([columns, rows]), corners
 
 
@@ -186,8 +228,8 @@ def _columns_of_edges(finger: Finger[Any], state: EquilibriumState) -> Indices:
 
 @lru_cache(maxsize=1)
 def _grid(finger: Finger[Any]) -> NestedGrid:
-    """Return the grid of a nested finger at small strain; consecutive surfaces of one mesh share it."""
-    return NestedGrid.of(finger if isinstance(finger, LinearFinger) else LinearFinger.on(finger.scene, finger.geometry))
+    """Return the grid of a nested finger; consecutive surfaces of one mesh share it."""
+    return NestedGrid.of(finger)
 
 
 def refine_lines(mesh: FingerMesh, parts: Array | None) -> Lines | None:

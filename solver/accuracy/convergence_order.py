@@ -50,18 +50,18 @@ def change_factor(order: float, kinematics: str) -> float:
     return richardson_factor(order) * (SAFETY if kinematics == "finite" and order == ORDER else 1.0)
 
 
-def local_excess(parts: Array, corners: float, order: float) -> float:
-    """Return how much larger the SED's error may be than its change, from signed `parts` (n,) of the change [MPa].
+def local_excess(parts: Array, corners: Array, order: float) -> Array:
+    """Return how much larger the errors (g,) of results may be than their changes, from signed `parts` (n, g) of these.
 
-    Each part of the error lies between that of the change and `richardson_factor` times it. Those of `corners`, in all,
-    may have `CORNER_ORDER`. So parts that cancel in the change may not cancel in the error.
+    Each part of the error lies between that of the change and `richardson_factor` times it. Those of `corners` (g,), in
+    all, may have `CORNER_ORDER`. So parts that cancel in the change may not cancel in the error.
 
-    >>> round(local_excess(np.array([3.0, -1.0]), 0.0, ORDER), 9)  # a change of 2, an error of 4/3 x 3 - 1
-    1.0
+    >>> local_excess(np.array([[3.0], [-1.0]]), np.zeros(1), ORDER).round(9)  # a change of 2, an error of 4/3 x 3 - 1
+    array([1.])
     """
     usual = richardson_factor(order) - 1.0
-    positive, negative = np.maximum(parts, 0.0).sum(), np.maximum(-parts, 0.0).sum()
-    return usual * float(max(positive, negative)) + (richardson_factor(CORNER_ORDER) - 1.0 - usual) * corners
+    positive, negative = np.maximum(parts, 0.0).sum(axis=0), np.maximum(-parts, 0.0).sum(axis=0)
+    return usual * np.maximum(positive, negative) + (richardson_factor(CORNER_ORDER) - 1.0 - usual) * corners
 
 
 def order_of(scene: Scene) -> float:

@@ -5,7 +5,7 @@ of quadratic elements beneath a contact fall at least with the square of the ele
 at most 1 + 1/4 + 1/16 + ... = 4/3 of the change from H to h (Roache 1994), times his factor of safety at finite strain
 (`convergence_order`). At a corner where stiff tissue holds soft
 tissue, errors may fall only with the first power, and the error is at most 1 + 1/2 + 1/4 + ... = 2 of the change. The
-error on h is the series without its first term. Parts of the mesh may cancel in the change of the SED, but not in its
+error on h is the series without its first term. Parts of the mesh may cancel in the change of a result, but not in its
 error, so that a bound from these parts counts at finite strain where it is larger (`local_excess`).
 
 Two meshes may agree by chance on where contact states change: an edge of contact, of stick or of slip at the bound lies
@@ -217,7 +217,9 @@ def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: St
     else:
         change = nested.numbers - numbers
         error = half_width(change, nested.edge_errors, nested.factor)
-        error[[0, FORCES_AND_PLACES]] += max(nested.sed_bound - nested.factor * abs(float(change[0])), 0.0)  # the SED
+        excess = np.maximum(nested.bounds - nested.factor * np.abs(change), 0.0)
+        excess[FORCES_AND_PLACES] = excess[0]  # the SED, again
+        error += excess
         if steps is not None:
             error += steps.error
         relative = error / np.maximum(np.abs(numbers), np.finfo(float).tiny)

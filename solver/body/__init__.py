@@ -12,6 +12,7 @@ from numpy.linalg import LinAlgError
 from solver._kernels import HELD_X, HELD_Y
 from solver.arrays import NEO_HOOKEAN, Array, ElementArrays, Indices, Narrow, inverse
 from solver.constitutive import Elasticity
+from solver.linalg import StaticCondensation
 from solver.mesh import Q2P1, Mesh, distinct, integrals
 from solver.quantities import LocalState
 
@@ -83,6 +84,9 @@ class Body(Protocol):
 
         With `only` (node numbers), other nodes may be left at 0.
         """
+
+    def tangent(self, u: Array, pressure: Array) -> StaticCondensation:
+        """Return the tangent at a state, condensed to the skin."""
 
     def recover_increments(self, skin: Array) -> Array:
         """Return the increments (n, 2, c) of all nodes by back substitution of the skin's (2 k, c)."""

@@ -15,8 +15,8 @@ from solver.arrays import Array, BodyState, ElementSystem, Indices, Narrow, Symb
 from solver.body import MeshElements, Patches, held_directions, integrate_elements
 from solver.body.validation import check_body, check_driven, check_laws
 from solver.constitutive import Elasticity, log1p, shape, slopes
-from solver.linalg import ElementSubset, Elimination, symbolic_factorization
-from solver.mesh import Mesh
+from solver.linalg import Elimination, StaticCondensation, symbolic_factorization
+from solver.mesh import Mesh, distinct
 from solver.quantities import QUANTITIES
 
 IMAGINARY = 1e-30  # step of a complex derivative, whose square underflows [-]
@@ -63,12 +63,14 @@ class FiniteBody(MeshElements):
 
     def recover_increments(self, skin: Array) -> Array:
         """Return the increments (nodes, 2, c) of all nodes for the skin's (2 k, c), with the last tangent."""
-        out = np.zeros((*self.mesh.nodes.shape, skin.shape[1]))
-        inside, recovery = self.condensed.inside, self.condensed.system.recovery_matrix[:, :, :16].copy()
-        every = np.ones(len(self.plan.start), bool)
-        subset = ElementSubset(every, self.elements.nodes, self.elements.unknown, recovery)
-        inside.displace(np.zeros(self.size), skin.T, subset, out)
-        return out
+        tangent = StaticCondensation(self.mesh, self.condensed.inside, self.condensed.system)
+        return tangent.displacement(skin, tangent.no_load)
+
+    def tangent(self, u: Array, pressure: Array) -> StaticCondensation:
+        """Return the tangent at a state, condensed to the skin; after an equilibrium, its last iteration's."""
+        if self.condensed.equilibrium is not u:
+            self.condensed.linearise(u, pressure)
+        return StaticCondensation(self.mesh, self.condensed.inside, self.condensed.system)
 
     def deformation(self, u: Array) -> Array:
         """Return F (e, 9, 2, 2) at the quadrature points for displacements `u` (nodes, 2)."""
@@ -238,3 +240,24 @@ class FinitePatches(Patches):
     def deformation(self, displacement: Array) -> Array:
         """Return F (p, 2, 2) for displacements (nodes, 2)."""
         return np.eye(2) + self.endings.probes.displacement_gradient(self.elements.mesh, displacement)
+
+    def gradient(self, displacement: Array) -> Array:
+        """Return the gradient (nodes, 2) of the first ending's SED at `displacement` (nodes, 2) [MPa/mm]."""
+        body, first = self.elements, self.endings.patch == 0
+        of, element, slopes_at = body.elements, self.endings.probes.element[first], self.endings.probes.gradient[first]
+        weight, modes = self.endings.weights[first] / self.endings.areas[0], body.modes_at(self.endings.probes)[first]
+        forces = np.zeros((len(body.mesh.elements), 9, 2))
+        H = np.swapaxes(slopes_at @ body.mesh.local(displacement, element), 1, 2)  # at the probes
+        log = _logarithm(H[:, 0, 0], H[:, 0, 1], H[:, 1, 0], H[:, 1, 1])
+        shear = weight * of.shear[element] * slopes(of.stiffening[element], _excess(H, log))[0]
+        stress = shear[:, None, None] * _inverse_and_excess(H)[1]
+        np.add.at(forces, element, np.swapaxes(stress @ slopes_at, 1, 2))
+        hosts = distinct(element)
+        number, gradient = np.searchsorted(hosts, element), np.stack([of.grad_x[hosts], of.grad_y[hosts]], axis=-1)
+        H = np.swapaxes(gradient, 2, 3) @ body.mesh.local(displacement, hosts)[:, None]  # (m, q, 2, 2) transposed
+        log = _logarithm(H[..., 0, 0], H[..., 1, 0], H[..., 0, 1], H[..., 1, 1])
+        fit, pressure = (body.weighted_modes[hosts] @ log[..., None])[number, :, 0], np.zeros((len(hosts), 3))
+        np.add.at(pressure, number, (weight * of.lame[element] * np.sum(modes * fit, axis=1))[:, None] * modes)
+        by_point = (pressure[:, None] @ body.weighted_modes[hosts])[:, 0, :, None, None]  # (m, q, 1, 1)
+        forces[hosts] += np.sum(by_point * (gradient @ _inverse_and_excess(H)[0]), axis=1)
+        return body.mesh.assemble(forces.reshape(-1, 18))

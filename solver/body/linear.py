@@ -14,11 +14,9 @@ from solver._kernels.multifrontal import DEFINITE
 from solver.arrays import Array, ElementSystem, Indices, determinant, inverse
 from solver.body import CondensedLinear, MeshElements, Patches, Probes, held_directions, integrate_elements, validation
 from solver.constitutive import Elasticity
-from solver.linalg import ElementSubset, Elimination, symbolic_factorization
+from solver.linalg import CondensedLoad, Elimination, StaticCondensation, symbolic_factorization
 from solver.mesh import GAUSS_4, Q2P1, Mesh, jacobians, line
 from solver.quantities import QUANTITIES, SED
-
-CondensedLoad = tuple[Array, Array]  # a load after forward elimination (n,), and centres' displacements (e, 2) under it
 
 
 class Elastic(MeshElements):
@@ -54,8 +52,8 @@ class Elastic(MeshElements):
         return SED.small(self.state(self.probe_data(probes), displacement))
 
 
-class LinearElimination:
-    """The factors of a body at small strain, and its static condensation to x, y of the k nodes of its skin."""
+class LinearElimination(StaticCondensation):
+    """A body at small strain, assembled, and condensed to its skin."""
 
     def __init__(self, mesh: Mesh, materials: Sequence[Elasticity]) -> None:
         """Assemble `mesh` with `materials` by region, and eliminate all unknowns but the skin's.
@@ -64,64 +62,15 @@ class LinearElimination:
         """
         plan = symbolic_factorization(mesh)
         self.elastic = Elastic(*integrate_elements(mesh, materials, plan.unknown))
-        count = len(mesh.elements)
-        self._inverse, self._recovery_matrix = np.zeros((count, 3)), np.zeros((count, 2, 17))
-        self._inside = Elimination(plan)
+        count, inside = len(mesh.elements), Elimination(plan)
         system = ElementSystem(
-            np.empty((count, 16, 16)), np.zeros(plan.size), self._recovery_matrix, self._inverse,
+            np.empty((count, 16, 16)), np.zeros(plan.size), np.zeros((count, 2, 17)), np.zeros((count, 3)),
             np.empty((count, 3, 18)), np.empty((count, 3)), np.zeros((0, 18)), np.zeros((0, 18, 18)),
         )  # fmt: skip
         element_loops.assemble(np.zeros(mesh.nodes.shape), np.zeros((count, 3)), True, self.elastic.elements, system)
-        if self._inside.factorise(system.tangent) != DEFINITE:
+        if inside.factorise(system.tangent) != DEFINITE:
             raise LinAlgError("the stiffness inside the body is not positive definite")
-        self._recovery_matrix = self._recovery_matrix[:, :, :16].copy()
-        self.stiffness = self._inside.stiffness
-        self.no_load: CondensedLoad = np.zeros(plan.size), np.zeros((count, 2))
-        self._subsets: dict[bytes | None, tuple[Indices, ElementSubset]] = {}
-
-    def condense(self, loads: Array) -> CondensedLoad:
-        """Return dead `loads` (nodes, 2) after forward elimination."""
-        mesh, plan = self.elastic.mesh, self._inside.plan
-        centre = loads[mesh.elements[:, 8], :, None]
-        of_centres = (self._inverse[:, [[0, 1], [1, 2]]] @ centre)[:, :, 0]
-        from_centre = (np.swapaxes(self._recovery_matrix, 1, 2) @ centre)[:, :, 0]  # (e, 16)
-        free = plan.unknown >= 0
-        force = np.zeros(plan.size)
-        force[plan.unknown[free]] = -loads[mesh.elements[:, :8]].reshape(-1, 16)[free]
-        np.add.at(force, plan.unknown[free], from_centre[free])
-        self._inside.condense(force)
-        return force, of_centres
-
-    def skin_load(self, load: CondensedLoad) -> Array:
-        """Return a load condensed to the skin (2 k,), 0 where the skin is held."""
-        mesh = self.elastic.mesh
-        return np.where(mesh.driven[mesh.skin].ravel(), 0.0, -load[0][len(load[0]) - len(self.stiffness) :])
-
-    def displacement(self, skin: Array, load: CondensedLoad, only: Indices | None = None) -> Array:
-        """Return the displacements (nodes, 2, c) by back substitution of the skin's (2 k, c) under a load.
-
-        With `only` (node numbers), other nodes may be left at 0.
-        """
-        mesh, (elements, subset) = self.elastic.mesh, self._elements_of(only)
-        out = np.zeros((*mesh.nodes.shape, skin.shape[1]))
-        self._inside.displace(load[0], skin.T, subset, out)
-        out[subset.nodes[:, 8]] += load[1][elements, :, None]
-        return out
-
-    def _elements_of(self, only: Indices | None) -> tuple[Indices, ElementSubset]:
-        """Return the elements that hold the nodes `only`, or all elements."""
-        key = None if only is None else only.tobytes()
-        if key not in self._subsets:
-            of = self.elastic.elements
-            flags = np.full(len(self.elastic.mesh.nodes), only is None)
-            flags[only] = True
-            elements = np.flatnonzero(flags[of.nodes].any(axis=1))
-            parts = self._inside.parts_holding(of.unknown[elements])
-            self._subsets[key] = (
-                elements,
-                ElementSubset(parts, of.nodes[elements], of.unknown[elements], self._recovery_matrix[elements]),
-            )
-        return self._subsets[key]
+        super().__init__(mesh, inside, system)
 
 
 Motion = Literal["x", "y", "turn"]
@@ -201,6 +150,10 @@ class LinearBody:
         about, recover = self.with_loads(-inner)
         about.rest = self.mesh.nodes[self.mesh.skin] + displacement[self.mesh.skin]
         return about, lambda step: displacement + recover(step)
+
+    def tangent(self, u: Array, pressure: Array) -> StaticCondensation:  # noqa: ARG002 - one for all states
+        """Return the condensed stiffness."""
+        return self.elimination
 
     def with_loads(self, loads: Array) -> tuple[CondensedLinear, Callable[[Array], Array]]:
         """Return the body under other dead `loads` (nodes, 2), and a function that recovers displacements.
