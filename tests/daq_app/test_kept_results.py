@@ -5,7 +5,7 @@ from unittest.mock import Mock
 
 import pytest
 from json_answer import answer
-from report_example import example
+from report_example import short
 
 from daq_app.analyst.work import Work
 from daq_app.cli.main import run
@@ -117,7 +117,7 @@ def test_a_study_replaces_its_own_files_and_no_other(small, tmp_path):
 
 
 def test_pictures_of_a_report_are_written_over_no_file_of_somebody_else(tmp_path):
-    report = example()
+    report = short()
     drawings = plates(report)
     for name in ("course.svg", "course.csv"):
         (tmp_path / name).write_text("<svg >mine</svg>\n")

@@ -303,6 +303,12 @@ def _contents():
     }
 
 
+def short():
+    """A report with the first of each of its parts, whose pictures are soon drawn."""
+    names = ("experiments", "strokes", "predictions", "fields", "ground_truth")
+    return example(**{name: _contents()[name][:1] for name in names})
+
+
 def bare(**changes):
     """A report without pictures, which is quick to write."""
     lists = ("experiments", "strokes", "predictions", "fields", "ground_truth", "flaws", "excluded", "reproduction")

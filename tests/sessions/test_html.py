@@ -13,7 +13,7 @@ import pytest
 from browser import CHROMIUM, FLAGS, PAPER_HEIGHT, open_page
 from matplotlib.figure import Figure
 from page_numbers import estimates
-from report_example import TABLES, bare, example
+from report_example import TABLES, bare, example, short
 from study_example import study
 
 from sessions.report.figures import plates
@@ -112,11 +112,8 @@ def test_every_link_and_clip_of_the_page_leads_to_exactly_one_place(page_text):
     assert targets | set(re.findall(r"url\(#([^)]*)\)", page_text)) <= set(words.ids)
 
 
-def test_the_same_report_gives_the_same_bytes(report):
-    first_items = {
-        n: getattr(report, n)[:1] for n in ("experiments", "strokes", "predictions", "fields", "ground_truth")
-    }
-    assert page(example(**first_items)) == page(example(**first_items))
+def test_the_same_report_gives_the_same_bytes():
+    assert page(short()) == page(short())
 
 
 @pytest.mark.slow

@@ -12,14 +12,16 @@ from daq_app.analyst.state import Choose
 from daq_app.qt import preferences, tokens
 from daq_app.qt.rooms import about_text
 from daq_app.recorder.messages import Stop
-from tests.daq_app.qt.review.examples import SESSION
+from tests.daq_app.qt.review.examples import SESSION, Nobody
 
 pytestmark = pytest.mark.qt
 PACE = 1.0  # no test here waits for a stroke
 
 
 @pytest.fixture
-def rooms(driver):
+def rooms(driver, monkeypatch):
+    """Return the rooms; a session that is opened is not analysed, in a process that takes a second to begin."""
+    monkeypatch.setattr("daq_app.qt.analyst_window.Analyst", lambda _: Nobody())
     yield driver.window.rooms
     driver.window.rooms.review.leave()
     driver.window.go_to("prepare")
@@ -162,7 +164,8 @@ def test_a_session_that_is_open_stays_as_it_is_when_it_is_chosen_again(rooms, mo
     assert rooms.analyst is analyst
 
 
-def test_a_session_that_is_open_follows_the_theme_with_its_plots_and_all_that_it_shows(driver, rooms):
+def test_a_session_that_is_open_follows_the_theme_with_its_plots_and_all_that_it_shows(driver, rooms, monkeypatch):
+    monkeypatch.undo()
     actions = entries(driver.window.menuBar())
     rooms.open(SESSION)
     driver.until(lambda: rooms.analyst.state.report is not None, "the report")
