@@ -78,9 +78,13 @@ class NestedNumbers:
     edge_errors: Array  # (2, m, COUNT) bounds of the parts of errors that m edges of contact add, as `half_width` takes
     row: Array  # (r,) SED of the row of receptors [MPa]
     row_edge_errors: Array  # (2, m, r) such bounds for `row`
-    factor: float  # on the change to these numbers, in the error estimates
-    bounds: Array  # (COUNT,) of errors but for edges, where parts of the mesh cancel in the change; 0 without a bound
+    excess: Array  # (COUNT,) of errors over `half_width`, where parts of the mesh cancel in the change
     shares: Array | None = None  # (a + b,) of each column and row of the mesh in the SED's error, where it is too large
+
+    @property
+    def relative_excess(self) -> float:
+        """The excess of the SED's error relative to the SED, which other results at receptors are taken to have."""
+        return float(self.excess[0]) / max(float(self.numbers[0]), np.finfo(float).tiny)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -21,8 +21,8 @@ import numpy as np
 
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver._kernels.contact_system import tributary
-from solver.accuracy.convergence_order import change_factor, local_excess, order_of
-from solver.accuracy.error_estimate import NO_NESTED_STATE, PARTS, WIDTH, Steps, edge_errors, errors
+from solver.accuracy.convergence_order import RICHARDSON, local_excess, parts_may_cancel
+from solver.accuracy.error_estimate import NO_NESTED_STATE, PARTS, POINT, WIDTH, Steps, edge_errors, errors
 from solver.arrays import Array, Indices
 from solver.body import Patches
 from solver.body.linear import Elastic
@@ -190,22 +190,22 @@ def nested_numbers(
     state depends on its load path. Returns NO_NESTED_STATE where no equilibrium exists with an edge moved, as at a
     friction limit.
     """
-    order = order_of(scene)
-    edges, factor = edge_errors(*changes, order, linear=[WIDTH]), change_factor(order, scene.solve.kinematics)
+    edges = edge_errors(*changes, linear=[WIDTH])
     if np.isinf(edges).any():
         return NO_NESTED_STATE
     results = values[:COUNT] if steps is None else steps.extrapolate(values[:COUNT])
-    change, bounds = np.abs(results - numbers), np.zeros(COUNT)
-    local = _local_parts(scene, *nested) if scene.solve.kinematics == "finite" else None
+    change, excess = np.abs(results - numbers), np.zeros(COUNT)
+    local = _local_parts(scene, *nested) if parts_may_cancel(scene) else None
     if local is not None:
-        bounds[:ADJOINTS] = change[:ADJOINTS] + local_excess(*local, order)
-    outcome = NestedNumbers(results, edges[..., :COUNT], values[COUNT:], edges[..., COUNT:], factor, bounds)
+        excess[:ADJOINTS] = np.maximum(local_excess(*local) - (RICHARDSON - 1.0) * change[:ADJOINTS], 0.0)
+    outcome = NestedNumbers(results, edges[..., :COUNT], values[COUNT:], edges[..., COUNT:], excess)
+    excess[POINT:] = outcome.relative_excess * np.abs(results[POINT:])
     target = scene.solve.target
     misses_tolerance = target is not None and errors(scene, numbers, outcome, steps).error_estimate > target
     if not misses_tolerance and scene.solve.contrast_tolerance is None:
         return outcome
     parts = np.abs((_local_parts(scene, *nested) if local is None else local)[0][:, 0])
-    parts *= max(factor * change[0], bounds[0]) / max(float(parts.sum()), np.finfo(float).tiny)
+    parts *= (RICHARDSON * change[0] + excess[0]) / max(float(parts.sum()), np.finfo(float).tiny)
     columns = np.concatenate([_columns_of_edges(*state) for state in (answer, nested)])
     np.add.at(parts, columns, edges[edges[..., 0].sum(axis=1).argmax(), :, 0])
     whole = float(parts.sum())

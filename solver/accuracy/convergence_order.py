@@ -1,8 +1,10 @@
-"""The order of convergence of a scene's errors with the element size, and the scenes that have none.
+"""The order of convergence of errors with the element size, and the scenes that have none.
 
-Errors of quadratic elements beneath a contact fall at least with the square of the element size. At a straight or
-convex corner of held and free tissue, displacements follow r^a with a >= 1/2 (Williams 1952, J. Appl. Mech. 19, 526),
-and errors of the energy follow the power 2 a. Such a corner lies where bone meets the free cut.
+Errors of quadratic elements beneath a contact fall at least with the square of the element size. So the error of a mesh
+is at most `RICHARDSON` times the change by halving its elements (Roache 1994, J. Fluids Eng. 116, 405). At a straight
+or convex corner of held and free tissue, displacements follow r^a with a >= 1/2 (Williams 1952, J. Appl. Mech. 19,
+526), and errors of the energy follow the power 2 a. Such a corner lies where bone meets the free cut. Its part of the
+error is at most `RICHARDSON_AT_CORNER` times its part of the change.
 
 At finite strain that corner is squeezed further on each finer mesh. A free face folds where it is squeezed along itself
 below a critical stretch (Biot 1963, Appl. Sci. Res. A 12, 168). Where only one element falls below it, the mesh does
@@ -27,49 +29,30 @@ from solver.prediction import percent
 from solver.scene import Scene
 from solver.scene.tables import TISSUES, Materials
 
-ORDER, CORNER_ORDER = 2.0, 1.0  # beneath a contact, and at a corner
+RICHARDSON, RICHARDSON_AT_CORNER = 4.0 / 3.0, 2.0  # 1 + 1/4 + 1/16 + ... and 1 + 1/2 + 1/4 + ...
 TRIAL_RATIO = 100.0  # largest ratio of stiffnesses of neighbouring tissues in the trials where estimates hold [-]
 
 
-def richardson_factor(order: float) -> float:
-    """Return the ratio of a mesh's error to the change by halving its elements: the sum of a geometric series."""
-    return 1.0 / (1.0 - 2.0**-order)
-
-
-# At finite strain the squeezed corner adds some error of first order everywhere: in trials the order was 1.6 to 2. The
-# factor of safety of a grid convergence study allows for this (Roache 1994, J. Fluids Eng. 116, 405).
-SAFETY = 1.25
-
-
-def change_factor(order: float, kinematics: str) -> float:
-    """Return the factor on a result's change to the nested mesh that bounds its error, but for edges of contact.
-
-    >>> round(change_factor(2.0, "small"), 3), round(change_factor(2.0, "finite"), 3), change_factor(1.0, "finite")
-    (1.333, 1.667, 2.0)
-    """
-    return richardson_factor(order) * (SAFETY if kinematics == "finite" and order == ORDER else 1.0)
-
-
-def local_excess(parts: Array, corners: Array, order: float) -> Array:
+def local_excess(parts: Array, corners: Array) -> Array:
     """Return how much larger the errors (g,) of results may be than their changes, from signed `parts` (n, g) of these.
 
-    Each part of the error lies between that of the change and `richardson_factor` times it. Those of `corners` (g,), in
-    all, may have `CORNER_ORDER`. So parts that cancel in the change may not cancel in the error.
+    Each part of the error lies between that of the change and `RICHARDSON` times it. Those of `corners` (g,), in all,
+    are up to `RICHARDSON_AT_CORNER` times. So parts that cancel in the change may not cancel in the error.
 
-    >>> local_excess(np.array([[3.0], [-1.0]]), np.zeros(1), ORDER).round(9)  # a change of 2, an error of 4/3 x 3 - 1
+    >>> local_excess(np.array([[3.0], [-1.0]]), np.zeros(1)).round(9)  # a change of 2, an error of 4/3 x 3 - 1
     array([1.])
     """
-    usual = richardson_factor(order) - 1.0
     positive, negative = np.maximum(parts, 0.0).sum(axis=0), np.maximum(-parts, 0.0).sum(axis=0)
-    return usual * np.maximum(positive, negative) + (richardson_factor(CORNER_ORDER) - 1.0 - usual) * corners
+    return (RICHARDSON - 1.0) * np.maximum(positive, negative) + (RICHARDSON_AT_CORNER - RICHARDSON) * corners
 
 
-def order_of(scene: Scene) -> float:
-    """Return the order of convergence that estimates of a scene assume.
+def parts_may_cancel(scene: Scene) -> bool:
+    """Return whether parts of a mesh may cancel in the change of results, as trials show where this is true.
 
-    It is `CORNER_ORDER` where neighbouring tissues differ in stiffness by more than in trials that show second order.
+    At finite strain the corner of the cut is squeezed further on each finer mesh. At small strain very stiff tissue
+    carries the drag to it.
     """
-    return CORNER_ORDER if _stiffness_ratio(scene.materials)[0] > TRIAL_RATIO else ORDER
+    return scene.solve.kinematics == "finite" or _stiffness_ratio(scene.materials)[0] > TRIAL_RATIO
 
 
 def refuse_folds(finger: Finger[Any], state: EquilibriumState) -> None:

@@ -1,12 +1,10 @@
 """Estimate the errors of a scene's results from its nested mesh and from moving the edges of contact.
 
 The scene is solved on the mesh H of the answer and on its nested mesh h, which divides every element into four. Errors
-of quadratic elements beneath a contact fall at least with the square of the element size. The error on H is therefore
-at most 1 + 1/4 + 1/16 + ... = 4/3 of the change from H to h (Roache 1994), times his factor of safety at finite strain
-(`convergence_order`). At a corner where stiff tissue holds soft
-tissue, errors may fall only with the first power, and the error is at most 1 + 1/2 + 1/4 + ... = 2 of the change. The
-error on h is the series without its first term. Parts of the mesh may cancel in the change of a result, but not in its
-error, so that a bound from these parts counts at finite strain where it is larger (`local_excess`).
+of quadratic elements beneath a contact fall at least with the square of the element size, so that the error on H is at
+most 4/3 of the change from H to h. The error on h is a quarter of that. Parts of the mesh may cancel in the change of a
+result, but not in its error. Where trials show this, a bound from these parts counts, if it is larger
+(`convergence_order`).
 
 Two meshes may agree by chance on where contact states change: an edge of contact, of stick or of slip at the bound lies
 anywhere between two nodes. On H and on h, each edge is moved by one node to either side at otherwise fixed contact
@@ -27,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from solver._kernels.active_set import SINGULAR
-from solver.accuracy.convergence_order import ORDER, change_factor, richardson_factor
+from solver.accuracy.convergence_order import RICHARDSON
 from solver.arrays import Array
 from solver.contact import ForceLoad
 from solver.equilibrium import EquilibriumState, Newton
@@ -37,32 +35,28 @@ from solver.quantities import NAMES
 from solver.scene import Scene
 from solver.scene.tables import USUAL_TOLERANCE
 
-SHIFT, WIDTH = 4, 5  # indices of the bone's shift and of the contact's width in `all_numbers`
+SHIFT, WIDTH, POINT = 4, 5, 6  # indices in `all_numbers`; those from POINT on are at the receptor
 
 
-def half_width(change: Array, edges: Array, factor: float) -> Array:
-    """Return the error estimate of results (...) from their `change` to the nested mesh and `edge_errors` (2, m, ...).
-
-    `factor` is the `change_factor`.
-    """
-    return factor * np.abs(change) + edges.sum(axis=1).max(axis=0)
+def half_width(change: Array, edges: Array) -> Array:
+    """Return the errors of results (...) from their `change` to the nested mesh and their `edge_errors` (2, m, ...)."""
+    return RICHARDSON * np.abs(change) + edges.sum(axis=1).max(axis=0)
 
 
-def edge_errors(on_mesh: Array, on_nested: Array, order: float = ORDER, linear: Sequence[int] = ()) -> Array:
+def edge_errors(on_mesh: Array, on_nested: Array, linear: Sequence[int] = ()) -> Array:
     """Return bounds (2, m + k, n) of the parts of n errors that m edges of contact add on H, and k edges on h.
 
     `on_mesh` (m, n) and `on_nested` (k, n) are the results' changes as each edge moves by a node of its mesh. A result
     is a parabola of the edge's position about the true one, which is at most half a node away. So the error by an edge
     lies between 0 and a quarter of the change. The errors E_H and E_h have one sign and add r E_h - (r - 1) E_H to the
-    extrapolated error, r being `richardson_factor`. So the larger of both terms counts, of the sums over the second
+    extrapolated error, r being `RICHARDSON`. So the larger of both terms counts, of the sums over the second
     axis. The results `linear` are linear in the position, to either side of the true one. Then errors are at most half
     the change, and both terms add.
 
     >>> edge_errors(np.array([[0.12]]), np.array([[0.03]])).sum(axis=1).max(axis=0).round(9)
     array([0.01])
     """
-    factor = richardson_factor(order)
-    on_mesh, on_nested = (factor - 1.0) / 4.0 * on_mesh, factor / 4.0 * on_nested
+    on_mesh, on_nested = (RICHARDSON - 1.0) / 4.0 * on_mesh, RICHARDSON / 4.0 * on_nested
     out = np.zeros((2, len(on_mesh) + len(on_nested), on_mesh.shape[1]))
     out[0, : len(on_mesh)], out[1, len(on_mesh) :] = on_mesh, on_nested
     out[:, :, list(linear)] = 2.0 * out[:, :, list(linear)].sum(axis=0)
@@ -216,10 +210,7 @@ def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: St
         error, relative, corrected = np.full(COUNT, np.nan), np.ones(COUNT), 1.0
     else:
         change = nested.numbers - numbers
-        error = half_width(change, nested.edge_errors, nested.factor)
-        excess = np.maximum(nested.bounds - nested.factor * np.abs(change), 0.0)
-        excess[FORCES_AND_PLACES] = excess[0]  # the SED, again
-        error += excess
+        error = half_width(change, nested.edge_errors) + nested.excess
         if steps is not None:
             error += steps.error
         relative = error / np.maximum(np.abs(numbers), np.finfo(float).tiny)
@@ -244,7 +235,7 @@ def row_errors(row: Array, nested: NestedNumbers | None) -> Array:
     """Return the relative errors (r,) of the SED of a row of receptors `row` (r,); nan where unknown."""
     if nested is None:
         return np.full(len(row), np.nan)
-    error = half_width(nested.row - row, nested.row_edge_errors, nested.factor)
+    error = half_width(nested.row - row, nested.row_edge_errors) + nested.relative_excess * np.abs(row)
     return error / np.maximum(row, np.finfo(float).tiny)
 
 
@@ -289,8 +280,7 @@ def contrast_error(predictions: Sequence[Prediction]) -> ContrastError:
     edges = np.stack([np.linalg.norm(nested.edge_errors[..., :count], axis=1) for _, nested in with_estimate], axis=1)
     pairs = np.array(list(combinations(range(len(with_estimate)), 2))).T
     apart = change[pairs[0]] - change[pairs[1]]
-    factor = max(nested.factor for _, nested in with_estimate)
-    worst = half_width(apart, np.hypot(edges[:, pairs[0]], edges[:, pairs[1]])[:, None], factor)
+    worst = half_width(apart, np.hypot(edges[:, pairs[0]], edges[:, pairs[1]])[:, None])
     off_by, mean = worst.max(axis=0), numbers.mean(axis=0)
     shares = off_by / np.maximum(
         np.maximum(np.ptp(numbers, axis=0), LEAST_RANGE * mean / WARNING_SHARE), np.finfo(float).tiny
@@ -334,8 +324,7 @@ def estimate_errors(
         edge_changes(body, equilibrium, forces, lambda states, body=body: np.array([numbers(body, s) for s in states]))
         for body, equilibrium in ((newton, state), nested)
     )
-    factor = change_factor(ORDER, "small" if newton.condensed.constant else "finite")
-    error = half_width(corrected - value, edge_errors(on_mesh, on_nested), factor)
+    error = half_width(corrected - value, edge_errors(on_mesh, on_nested))
     if fewer:
         if len(fewer) != len(PARTS):
             raise ValueError(f"fewer has {len(fewer)} states; give one after each of {PARTS.tolist()} of the steps")

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver.accuracy.adaptivity import FingerState
-from solver.accuracy.convergence_order import change_factor, order_of, refuse_folds
+from solver.accuracy.convergence_order import refuse_folds
 from solver.accuracy.error_estimate import PARTS, WIDTH, edge_changes, edge_errors, half_width
 from solver.arrays import Array
 from solver.contact import ForceLoad
@@ -112,13 +112,11 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
             refuse_folds(nested, state)
     except SolveFailure:
         return CourseNumbers(usual.value * np.nan, usual.rate * np.nan)
-    order = order_of(scene)
-    factor = change_factor(order, scene.solve.kinematics)
     finer, fewer = course_numbers(course), [course_numbers(numbers) for numbers in courses]
     edges = np.zeros((2, *usual.value.shape))
     if not scene.materials.relax:
         at_ends = zip(states_at(paths[0], courses[0]), states_at(path, course), strict=True)
-        edges += np.stack([_edge_errors(scene, (mesh, a), (nested, b), order) for a, b in at_ends], axis=1)
+        edges += np.stack([_edge_errors(scene, (mesh, a), (nested, b)) for a, b in at_ends], axis=1)
     times = np.concatenate([[0.0], course.time])[[0, *instants(course)]]
     of_quantities = np.pad(edges[:, :, len(COURSE_NUMBERS) :], ((0, 0), (1, 0), (0, 0)))
     with np.errstate(divide="ignore", invalid="ignore"):  # of a missing part
@@ -129,12 +127,12 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
         by_steps = sum(
             abs(number - value) / (1.0 / part - 1.0) for number, part in zip(by_part, PARTS.tolist(), strict=True)
         )
-        return half_width(nested_value - by_part[0], by_edges[:, None], factor) + by_steps
+        return half_width(nested_value - by_part[0], by_edges[:, None]) + by_steps
 
     return CourseNumbers(error("value", edges), error("rate", rate_edges))
 
 
-def _edge_errors(scene: Scene, answer: FingerState, nested: FingerState, order: float) -> Array:
+def _edge_errors(scene: Scene, answer: FingerState, nested: FingerState) -> Array:
     """Return the `edge_errors` (2, 5 + q) of the results at an instant, summed over edges of contact."""
 
     def changes(finger: Finger[Any], state: EquilibriumState) -> Array:
@@ -142,5 +140,5 @@ def _edge_errors(scene: Scene, answer: FingerState, nested: FingerState, order: 
         forces = ForceLoad(float(state.normal.sum()), None, state.load.travel) if by_force else None
         return edge_changes(finger.newton, state, forces, finger.all_numbers)[1]
 
-    sums = edge_errors(changes(*answer), changes(*nested), order, linear=[WIDTH]).sum(axis=1)
+    sums = edge_errors(changes(*answer), changes(*nested), linear=[WIDTH]).sum(axis=1)
     return np.concatenate([sums[:, _PLACES], sums[:, len(_PLACES) + 2 :]], axis=1)

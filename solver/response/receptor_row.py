@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver.accuracy.adaptivity import FingerState
-from solver.accuracy.convergence_order import change_factor, order_of, refuse_folds
+from solver.accuracy.convergence_order import refuse_folds
 from solver.accuracy.error_estimate import PARTS, Steps, edge_changes, edge_errors, half_width
 from solver.arrays import Array
 from solver.body import Patches
@@ -77,17 +77,16 @@ def _row_errors(prediction: Prediction, values: Array, arcs: Array, receptor: Re
     if in_steps:
         answer, nested = ((finger, end_of_path(scene, finger)) for finger, _ in (answer, nested))
     refuse_folds(*nested)
-    order = order_of(scene)
-    factor = change_factor(order, scene.solve.kinematics)
     (_, on_mesh), (finer, on_nested) = (
         edge_changes(finger.newton, state, forces_of(scene, state.load), row_numbers(finger))
         for finger, state in (answer, nested)
     )
-    errors = half_width(finer - values.ravel(), edge_errors(on_mesh, on_nested, order), factor)
+    errors = half_width(finer - values.ravel(), edge_errors(on_mesh, on_nested))
     if in_steps:
         usual, *fewer = row_numbers(coarse)([end_of_path(scene, coarse, times) for times in (1.0, *PARTS.tolist())])
         errors += Steps.of(usual, np.array(fewer), scene.solve.target).bound
-    return errors.reshape(values.shape)
+    excess = prediction.nested.relative_excess if prediction.nested else np.nan
+    return errors.reshape(values.shape) + excess * np.abs(values)
 
 
 def _solve_again(prediction: Prediction) -> tuple[FingerState, FingerState, Finger[Any]]:

@@ -15,7 +15,7 @@ PUBLISHED = scene(STICKINESS[0])
 
 def surface(numbers, nested, edges=(0.0, 0.0, 0.0, 0.0)):
     names = ("sed_ending", "normal_force", "tangential_force", "indentation")
-    nested_numbers = SimpleNamespace(numbers=np.array(nested), edge_errors=np.zeros((2, 1, 4)), factor=4.0 / 3.0)
+    nested_numbers = SimpleNamespace(numbers=np.array(nested), edge_errors=np.zeros((2, 1, 4)))
     nested_numbers.edge_errors[1, 0] = edges
     return SimpleNamespace(scene=PUBLISHED, nested=nested_numbers, **dict(zip(names, numbers, strict=True)))
 
