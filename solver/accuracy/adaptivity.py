@@ -18,6 +18,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver._kernels.contact_system import tributary
@@ -81,15 +82,21 @@ class NestedGrid:
     ) -> tuple[Array, Array, Array]:
         """Return the signed parts of columns (a, ADJOINTS) and rows (b, ADJOINTS) in the changes to this mesh.
 
-        They belong to the first results of `all_numbers`. The third array (ADJOINTS,) is the size of the parts of the
-        mesh's corners, where held edges meet free ones. `displacement` (nodes, 2) and the contact states of `state`
+        They belong to the first results of `all_numbers`. The third array (ADJOINTS,) is the size of the parts of
+        corners between a held and a free side. `displacement` (nodes, 2) and the contact states of `state`
         under `forces`, if any, are those on this mesh.
         """
         fields = (displacement, adjoints(self.finger, displacement, state, forces))
         u, z = (_differences(self._curvature(field)) for field in fields)
         by_column, by_row = (self._energy(*pair) for pair in zip(u, z, strict=True))
-        corners = np.sum(np.abs(by_column[CORNERS]) + np.abs(by_row[CORNERS]), axis=(0, 1))
-        return by_column.sum(axis=1), by_row.sum(axis=0), corners
+        corners = np.abs(by_column[CORNERS]) + np.abs(by_row[CORNERS])
+        return by_column.sum(axis=1), by_row.sum(axis=0), corners[self.singular_corners()].sum(axis=0)
+
+    def singular_corners(self) -> NDArray[np.bool_]:
+        """Return which of the mesh's `CORNERS` (2, 2) lie between a held and a free side."""
+        first, second, ends = np.array([[0], [1]]), np.array([[0, 1]]), 4 * np.arange(2)
+        held = self.finger.geometry.mesh.driven.all(axis=1)[self.nodes[CORNERS]]
+        return held[first, second, 2, ends] != held[first, second, ends[:, None], 2]
 
     def _curvature(self, values: Array) -> Array:
         """Return nodal values (nodes, 2, ...) by element (a, b, 5, 5, 2 c), less their best fit by 1, x, y.

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import Friction, Loading, NoSteadyState, Scene, Solve, solve, solve_many
+from solver import Finger, Friction, Loading, NoSteadyState, Scene, Solve, solve, solve_many
 from solver._kernels import STICK
 from solver.accuracy import adaptivity
 from solver.accuracy.adaptivity import ADJOINTS, MAX_UNKNOWNS, NestedGrid, adjoints, refine_lines
@@ -178,3 +178,10 @@ def test_at_finite_strain_a_tolerance_is_met_on_lines_that_were_added():
     assert strict.error_estimate <= 0.002
     assert min(strict.wall_s, strict.setup_s, strict.estimate_s) > 0.0
     assert abs(strict.sed_ending / usual.sed_ending_corrected - 1.0) < 0.002 + usual.error_estimate
+
+
+@pytest.mark.parametrize(("cut", "singular"), [("free", [True, False]), ("driven", [False, True])])  # at bone, at skin
+def test_a_corner_of_the_mesh_is_singular_between_a_held_and_a_free_side(cut, singular):
+    scene = Scene(friction=Friction(0.3), loading=Loading(1.0), finger=Finger(cut=cut))
+    grid = NestedGrid.of(LinearFinger.of(scene, Sizing(4.0, 1.0, halved=True)))
+    assert grid.singular_corners().tolist() == [singular, singular]
