@@ -95,7 +95,7 @@ class NestedGrid:
     def singular_corners(self) -> NDArray[np.bool_]:
         """Return which of the mesh's `CORNERS` (2, 2) lie between a held and a free side."""
         first, second, ends = np.array([[0], [1]]), np.array([[0, 1]]), 4 * np.arange(2)
-        held = self.finger.geometry.mesh.driven.all(axis=1)[self.nodes[CORNERS]]
+        held = self.finger.geometry.mesh.driven[self.nodes[CORNERS], 0]
         return held[first, second, 2, ends] != held[first, second, ends[:, None], 2]
 
     def _curvature(self, values: Array) -> Array:
