@@ -79,12 +79,8 @@ class NestedNumbers:
     row: Array  # (r,) SED of the row of receptors [MPa]
     row_edge_errors: Array  # (2, m, r) such bounds for `row`
     excess: Array  # (COUNT,) of errors over `half_width`, where parts of the mesh cancel in the change
+    relative_excess: float  # of the SED's error, which the results of all receptors are taken to have [-]
     shares: Array | None = None  # (a + b,) of each column and row of the mesh in the SED's error, where it is too large
-
-    @property
-    def relative_excess(self) -> float:
-        """The excess of the SED's error relative to the SED, which other results at receptors are taken to have."""
-        return float(self.excess[0]) / max(float(self.numbers[0]), np.finfo(float).tiny)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

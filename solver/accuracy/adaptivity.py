@@ -201,12 +201,13 @@ def nested_numbers(
     if np.isinf(edges).any():
         return NO_NESTED_STATE
     results = values[:COUNT] if steps is None else steps.extrapolate(values[:COUNT])
-    change, excess = np.abs(results - numbers), np.zeros(COUNT)
+    change, excess, relative_excess = np.abs(results - numbers), np.zeros(COUNT), 0.0
     local = _local_parts(scene, *nested) if parts_may_cancel(scene) else None
     if local is not None:
         excess[:ADJOINTS] = np.maximum(local_excess(*local) - (RICHARDSON - 1.0) * change[:ADJOINTS], 0.0)
-    outcome = NestedNumbers(results, edges[..., :COUNT], values[COUNT:], edges[..., COUNT:], excess)
-    excess[POINT:] = outcome.relative_excess * np.abs(results[POINT:])
+        relative_excess = float(excess[0]) / max(float(results[0]), np.finfo(float).tiny)
+        excess[POINT:] = relative_excess * np.abs(results[POINT:])
+    outcome = NestedNumbers(results, edges[..., :COUNT], values[COUNT:], edges[..., COUNT:], excess, relative_excess)
     target = scene.solve.target
     misses_tolerance = target is not None and errors(scene, numbers, outcome, steps).error_estimate > target
     if not misses_tolerance and scene.solve.contrast_tolerance is None:

@@ -3,8 +3,8 @@
 Errors of quadratic elements beneath a contact fall at least with the square of the element size. So the error of a mesh
 is at most `RICHARDSON` times the change by halving its elements (Roache 1994, J. Fluids Eng. 116, 405). At a straight
 or convex corner of held and free tissue, displacements follow r^a with a >= 1/2 (Williams 1952, J. Appl. Mech. 19,
-526), and errors of the energy follow the power 2 a. Such a corner lies where bone meets the free cut. Its part of the
-error is at most `RICHARDSON_AT_CORNER` times its part of the change.
+526), and errors of the energy follow the power 2 a. Its part of the error is at most `RICHARDSON_AT_CORNER` times its
+part of the change. Such a corner lies where bone meets the free cut.
 
 At finite strain that corner is squeezed further on each finer mesh. A free face folds where it is squeezed along itself
 below a critical stretch (Biot 1963, Appl. Sci. Res. A 12, 168). Where only one element falls below it, the mesh does
@@ -47,7 +47,7 @@ def local_excess(parts: Array, corners: Array) -> Array:
 
 
 def parts_may_cancel(scene: Scene) -> bool:
-    """Return whether parts of a mesh may cancel in the change of results, as trials show where this is true.
+    """Return whether parts of a mesh cancel in the changes of results in trials of such scenes.
 
     At finite strain the corner of the cut is squeezed further on each finer mesh. At small strain very stiff tissue
     carries the drag to it.

@@ -86,7 +86,7 @@ def test_an_error_that_falls_with_the_square_of_an_element_is_known_and_edges_ad
     truth, error = np.ones(COUNT), 0.04
     zeros = np.zeros((2, 1, COUNT))
     edges = edge_errors(np.full((2, COUNT), 0.012), np.full((2, COUNT), 0.005), linear=[WIDTH])
-    nested = NestedNumbers(truth * (1.0 + error / 4.0), zeros, zeros, zeros, np.zeros(COUNT))
+    nested = NestedNumbers(truth * (1.0 + error / 4.0), zeros, zeros, zeros, np.zeros(COUNT), 0.0)
     estimate = errors(sliding, truth * (1.0 + error), nested, None)
     assert estimate.error_estimate == pytest.approx(error / (1.0 + error), rel=1e-12)
     assert estimate.corrected_error == pytest.approx(error / 4.0 / (1.0 + error / 4.0), rel=1e-12)
