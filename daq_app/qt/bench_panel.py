@@ -13,7 +13,7 @@ from daq_app.qt.tokens import GRID, px, theme_of
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
 from daq_app.window.live_feed import LOADS
 from daq_app.window.state import Message
-from daq_app.window.view import HEALTH_NAMES, Bar, BenchView
+from daq_app.window.view_bench import HEALTH_NAMES, Bar, BenchView
 from daq_app.wording import tr, tr_noop
 
 SHOWN_COUNTERS = tr_noop(

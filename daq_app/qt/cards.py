@@ -21,7 +21,7 @@ from daq_app.window.checklist import Card
 from daq_app.window.new_session import SessionForm, UnfinishedSession, subject_texts, unfinished_sessions
 from daq_app.window.state import Message, TransducerHolders
 from daq_app.window.subject import LENGTH, SubjectText, translator
-from daq_app.window.view import BenchView, bench_summary
+from daq_app.window.view_bench import BenchView, bench_summary
 from daq_app.wording import tr
 from sessions.plan.protocols.protocol import ENGLISH
 

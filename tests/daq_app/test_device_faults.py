@@ -18,7 +18,7 @@ from daq_app.recorder.messages import HealthReport
 from daq_app.simulation import wiring
 from daq_app.simulation.wiring import connect
 from daq_app.window.state import AppState, BenchState, fold
-from daq_app.window.view import bench_view
+from daq_app.window.view_bench import bench_view
 from daq_app.wording import COUNT_LABELS
 from drivers.clock import RealClock
 from drivers.transducer import COUNTS, Health

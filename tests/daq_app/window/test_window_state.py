@@ -301,7 +301,7 @@ def test_a_bench_that_is_not_being_read_has_a_dash_for_its_rate():
 
 
 def test_what_was_lost_and_a_rate_that_is_not_known_are_said_in_the_experimenters_language(monkeypatch):
-    monkeypatch.setattr("daq_app.window.view.tr", lambda text, **values: f"<{text.format(**values)}>")
+    monkeypatch.setattr("daq_app.window.view_bench.tr", lambda text, **values: f"<{text.format(**values)}>")
     report = m.HealthReport(Health(received=7000, lost=3), 6998.0, (0.0,) * 7, (0.0,) * 7, 0)
     bench = derive_view(after(m.Device(replace(INFO, rate=float("nan")), None), report)).bench
     assert (bench.lamp_text, bench.rate) == ("3 <lost>", "<6998 Hz (set <unknown>)>")
