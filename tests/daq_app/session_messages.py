@@ -48,6 +48,10 @@ def log(kind, trial=None, **data):
     return LoggedEvent(1, 0, kind, trial, 0, data)
 
 
+def health_report(load, peak=None):
+    return m.HealthReport(Health(), 7000.0, load, peak or load, 0)
+
+
 def status(safe_ns, state="mounting"):
     return Status(state, 1, 10, 100, 0, 2.0, Acknowledged(100, 3, safe_ns))
 
