@@ -245,7 +245,7 @@ class NumberField(_Field):
         self.setFocusProxy(self.field)
 
     def begin(self) -> None:
-        self.field.clear()
+        self.field.setText("")  # unlike clear, it leaves nothing of the last answer to Ctrl+Z
         super().begin()
 
     @property

@@ -85,7 +85,7 @@ class CoursePanel(Panel):
         self._act = act
         self._name_question(entry, entry.question)
         self.line.setAccessibleName(entry.question)
-        self.line.clear()
+        self.line.setText("")  # unlike clear, it leaves nothing of the last text to Ctrl+Z
         self._bottom.setCurrentIndex(1)
         self.line.setFocus()
 

@@ -115,6 +115,19 @@ def test_while_a_note_is_typed_every_key_is_the_notes_and_none_an_answer(driver)
     assert window.subject.line.answered
 
 
+def test_ctrl_z_in_an_empty_entry_brings_no_words_of_an_entry_before(driver):
+    driver.begin()
+    driver.go_on("scoring")
+    course = driver.window.course
+    QTest.keyClick(driver.window, Qt.Key.Key_N)
+    QTest.keyClicks(course.line, "a note")
+    QTest.keyClick(course.line, ENTER)
+    assert not course.asking
+    QTest.keyClick(driver.window, Qt.Key.Key_N)
+    QTest.keyClick(course.line, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert course.line.text() == ""
+
+
 def begin_scoring(driver):
     """Begin a visit without forces, and go on to the first answer."""
     driver.begin(scores_only=True)

@@ -292,6 +292,16 @@ def test_a_number_is_typed_of_digits_alone():
 
 
 @pytest.mark.usefixtures("application")
+def test_ctrl_z_does_not_bring_the_number_of_the_trial_before_into_the_next():
+    field = NumberField(lambda: 0.0)
+    QTest.keyClicks(field.field, "70")
+    field.begin()
+    QTest.keyClick(field.field, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert field.field.text() == ""
+    assert field.answer.value is None
+
+
+@pytest.mark.usefixtures("application")
 @pytest.mark.parametrize(
     ("language", "typed", "doubt", "numbers"),
     [
