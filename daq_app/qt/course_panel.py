@@ -47,7 +47,6 @@ class CoursePanel(Panel):
             grid.addWidget(widget, index // columns, index % columns)
         self.plan.setMinimumHeight(3 * TARGET // 2)
         entry, self._do = QWidget(), button("", tr("do it"), self._keep)
-        entry.setMinimumHeight(px(88))
         row = hbox((self._do, 1), (button(tr("Back  Esc"), tr("go back, and do nothing"), self.leave), 1))
         vbox(1, self._question, self.line, row, on=entry, spacing=GRID)
         self._bottom = stack_pages(acts, entry)

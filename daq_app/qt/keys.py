@@ -146,6 +146,7 @@ class KeysPage(Panel):
 class Keyboard(QObject):
     """The keys of the experimenter's and the subject's window."""
 
+    typing = Signal(QWidget)  # this text field of either window has the keyboard
     free = Signal()  # no text field or other program has the keyboard any more
     nothing_to_give = Signal()  # the key that gives an answer was pressed while none is due
 
@@ -215,6 +216,8 @@ class Keyboard(QObject):
         return owner(name_of(event), self._subject.asks, typing=typing, from_subject=from_subject, by_keys=by_keys)
 
     def _focus_changed(self, previous: QWidget | None, now: QWidget | None) -> None:
+        if is_text_field(now):
+            self.typing.emit(now)
         came_here = now is not None and now.window() is self._window
         if came_here and is_text_field(previous) and self.focused_field() is None:
             self.free.emit()

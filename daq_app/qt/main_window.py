@@ -6,7 +6,7 @@ from datetime import datetime
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QGuiApplication, QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QMainWindow, QWidget
 
@@ -72,6 +72,7 @@ class MainWindow(QMainWindow):
         self.subject.closed.connect(self._subject_closed)
         self.keyboard = self.side.keyboard
         self.keyboard.nothing_to_give.connect(self._point_to_space)
+        self.keyboard.typing.connect(self._scroll_to)
         self.rooms = Rooms(bridge, self.rail, Menus(self, self.act))
         self.keys = KeysPage(self)
         self._refused_uri = ""  # address of the transducer whose holder was looked for
@@ -260,6 +261,7 @@ class MainWindow(QMainWindow):
         """Show the page of a new session (0) or the running session (1), with the matching focus."""
         if page != self._left.currentIndex():
             self._left.setCurrentIndex(page)
+            self._below.ensureVisible(0, 0)
             self._fit()
             (self.page.subject if page == 0 else self).setFocus()
             if page == 1:
@@ -320,6 +322,11 @@ class MainWindow(QMainWindow):
         self.notice.set_collapsible(height <= LOW)
         self.keys.fit()
 
+    def _scroll_to(self, field: QWidget) -> None:
+        """Scroll the panels to a text field, once it has its place."""
+        if self._below.isAncestorOf(field):
+            QTimer.singleShot(0, field, lambda: self._below.ensureWidgetVisible(field))
+
     def _lay_out(self) -> QWidget:
         window = QWidget()
         window.setObjectName("window")
@@ -330,9 +337,9 @@ class MainWindow(QMainWindow):
         body.setContentsMargins(0, 0, 0, 0)
         body.setSpacing(GRID)
         page = QWidget()
-        below = scroll_area(panels)
-        below.setMinimumHeight(1)  # the current step is complete even in a low window
-        vbox(self.notice, self.to_do, (below, 1), on=page, spacing=GRID)
+        self._below = scroll_area(panels)
+        self._below.setMinimumHeight(1)  # the current step is complete even in a low window
+        vbox(self.notice, self.to_do, (self._below, 1), on=page, spacing=GRID)
         self.rooms.addWidget(page)
         room = vbox(self.header, (self.rooms, 1), spacing=GRID)
         hbox(self.rail, (room, 1), on=window, margins=(GRID, GRID // 2, GRID, GRID), spacing=GRID)

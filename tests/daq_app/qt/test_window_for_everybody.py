@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QEvent, QLocale, QPointF, Qt
+from PySide6.QtCore import QEvent, QLocale, QPoint, QPointF, Qt
 from PySide6.QtGui import QAccessible, QKeyEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
@@ -105,6 +105,19 @@ def test_of_a_window_lower_than_its_panels_all_can_be_scrolled_to(driver):
         place = widget.rect().translated(widget.mapTo(window, widget.rect().topLeft()))
         assert window.rect().contains(place)
         assert widget.height() >= widget.minimumHeight()
+
+
+def test_in_the_lowest_window_a_session_begins_at_its_plans_top_and_a_note_is_typed_where_it_is_seen(driver):
+    window = driver.window
+    window.resize(683, 384)
+    driver.application.processEvents()
+    driver.begin()
+    driver.go_on("mounting")
+    panel, line = window._below.viewport(), window.course.line
+    assert window.course.mapTo(panel, QPoint()).y() == 0
+    QTest.keyClick(window, Qt.Key.Key_N)
+    driver.until(lambda: line.visibleRegion().boundingRect() == line.rect(), "the whole line of the note")
+    assert laid_over(window.course, (window.course._question, line, window.course._do)) == []
 
 
 def test_what_to_do_now_is_whole_in_the_lowest_window_with_a_banner_of_three_lines_and_two_buttons(driver):
