@@ -16,6 +16,7 @@ from daq_app.recorder.display import Display
 from daq_app.recorder.pipes import Inbox, Outbox
 from daq_app.recorder.session import SessionSetup, begin, resume, run
 from drivers.clock import LONGEST_STEP, Clock, clock_at
+from sessions.file_access import failure_sentence
 
 LAST_WORDS = 2.0  # for the client to fetch the last reports [s]
 
@@ -89,6 +90,8 @@ class Recorder:
         except Exception as error:  # noqa: BLE001  a bug must not end the recorder
             kind, from_us = type(error).__name__, is_ours(type(error).__module__)
             sentence = " ".join(str(error).split()) if from_us else f"unexpected {kind} ({error})"
+            if isinstance(error, OSError) and error.filename is not None and not from_us:
+                sentence = failure_sentence(error)
             self._send(m.Failed(name, sentence, kind))
 
 

@@ -190,6 +190,14 @@ def test_a_session_is_never_written_over(session_folder, capsys):
     assert {path.name: path.read_bytes() for path in session_folder.iterdir()} == before
 
 
+def test_a_folder_whose_name_no_disk_takes_is_a_sentence_and_no_bug_of_the_recorder(tmp_path, capsys):
+    words = ["run", "sensotact-friction", "--scores-only", "--subject", "P08", "--simulate-subject", "1"]
+    assert run([*words, "--out", str(tmp_path / ("n" * 300))]) == 1
+    output = capsys.readouterr().err
+    assert "check its name" in output
+    assert "unexpected" not in output
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "sentence"),
     [
