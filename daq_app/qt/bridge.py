@@ -16,7 +16,17 @@ from daq_app.window.course_state import Judged
 from daq_app.window.live_feed import LiveFeed, merge_live
 from daq_app.window.live_model import Settle
 from daq_app.window.live_model_process import LiveModel
-from daq_app.window.state import AppState, DevicesFound, DrawingFailed, LifeKnown, Message, Searching, Tick, fold
+from daq_app.window.state import (
+    AppState,
+    DevicesFound,
+    DrawingFailed,
+    LifeKnown,
+    Message,
+    NewSession,
+    Searching,
+    Tick,
+    fold,
+)
 from daq_app.window.stroke_quality import Judge
 from daq_app.window.subject import translator
 from daq_app.window.view import View, derive_view
@@ -97,6 +107,8 @@ class Bridge(QObject):
                 self._client = self._start()
                 self._fold(m.Gone(True, ""))
             self._client.send(message)
+        if isinstance(message, NewSession) and self.state.session is None:
+            self.model.follow(None)  # the next subject's page shows nothing of the last stroke
         self._show()
 
     def search(self) -> None:

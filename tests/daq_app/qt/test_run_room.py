@@ -16,6 +16,7 @@ from daq_app.qt.live_panel import LivePanel
 from daq_app.qt.middle import InspectedTrial, TrialStrip
 from daq_app.qt.preferences import DRAWER, DRAWER_SIZES
 from daq_app.window.course_state import Mark
+from daq_app.window.live_model import SettledSolve
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 from daq_app.window.state import NewSession
 from daq_app.window.view_course import Inspection, PlanRow, Tile
@@ -255,3 +256,12 @@ def test_a_visit_of_scores_only_has_no_force_plots_that_stay_empty(driver):
     window.bridge.send(NewSession())
     driver.until(lambda: driver.session is None, "the next session")
     assert any(plot.isVisible() for plot in window.live.plots)
+
+
+def test_the_page_of_a_new_session_shows_no_full_solve_of_the_last_subjects_stroke(driver):
+    bridge = driver.window.bridge
+    driver.begin("P32", scores_only=True)
+    driver.abort()
+    bridge.model.settled = SettledSolve((1.2, 2.0), 0.004, 0.01, 0.0041, np.empty(0), None, 2.0, "small")
+    bridge.send(NewSession())
+    assert bridge.model.settled is None
