@@ -219,3 +219,23 @@ def test_other_kinds_of_answer_are_given_on_the_tablet_too(desk, protocol, give,
     browser.click("next")
     assert answer_to(driver, driver.session.trial) == expected
     browser.until("pending.length == 0", "the acknowledgement")
+
+
+def test_a_palm_on_the_line_moves_no_mark(desk):
+    driver, browser = desk
+    browser.call("Page.navigate", url=driver.window.tablet.server.link)
+    browser.until("document.readyState == 'complete' && ruling")
+    browser.click("skip")
+    driver.until(lambda: not driver.window.tablet.problem)
+    driver.window.act("primary")
+    driver.phase("idle")
+    ask(driver)
+    browser.until("asked()", "the question")
+    points = [
+        {"id": number, "x": x, "y": y} for number, (x, y) in enumerate(browser.middle("line", p) for p in (0.7, 0.1))
+    ]
+    for touching in (points[:1], points, points[:1], []):
+        kind = "touchStart" if len(touching) else "touchEnd"
+        browser.call("Input.dispatchTouchEvent", type=kind, touchPoints=touching)
+    browser.click("next")
+    assert answer_to(driver, 1) == "score 70"
