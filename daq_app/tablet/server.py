@@ -30,6 +30,7 @@ TRIES = 5  # wrong codes before the code is replaced
 WRONG_CODE = 1.0  # wait after a wrong code [s]: with 10^6 codes and `TRIES` a guess succeeds once in days
 ALIVE = 5.0  # longest silence of a connected tablet [s]
 _PATIENCE = 10.0  # for the first message [s]
+_FAREWELL = 0.1  # for the last one [s], which the window may wait for: a message travels in milliseconds
 REPLACED = 4000  # close code for a tab that another tab of the same browser replaces; see page.html
 OFF = logging.CRITICAL + 1
 _PAGE = Path(__file__).with_name("page.html")
@@ -77,6 +78,7 @@ class TabletServer:
             max_size=LARGEST,
             ping_interval=ALIVE / 2,
             ping_timeout=ALIVE / 2,
+            close_timeout=_FAREWELL,
             compression=None,
             logger=logging.Logger("tablet", OFF),  # no tracebacks in the terminal that opened the window
         )

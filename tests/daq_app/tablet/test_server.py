@@ -9,6 +9,7 @@ import urllib.error
 import urllib.request
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from socket import create_connection
 
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
@@ -73,6 +74,32 @@ def test_nothing_but_the_page_is_reachable(server):
 def test_another_page_cannot_talk_in_the_name_of_the_browser(server):
     with pytest.raises(InvalidStatus), connect(place(server), origin="http://elsewhere.example"):
         pass
+
+
+def test_a_tablet_that_falls_silent_is_gone_in_time_and_the_window_never_waits_for_it(monkeypatch):
+    monkeypatch.setattr(module, "ALIVE", 0.5)
+    server = TabletServer("127.0.0.1", 0, lambda *_: None, lambda: None)
+    host, hello = server.url.removeprefix("http://"), json.dumps({"type": "hello", "code": server.code}).encode()
+    head = (
+        "GET /socket HTTP/1.1",
+        f"Host: {host}",
+        f"Origin: {server.url}",
+        "Upgrade: websocket",
+        "Connection: Upgrade",
+    )
+    key = ("Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==", "Sec-WebSocket-Version: 13", "", "")
+    with create_connection(host.split(":")) as silent:  # it reads nothing, and answers no ping and no farewell
+        silent.sendall("\r\n".join(head + key).encode() + bytes([0x81, 0x80 | len(hello), 0, 0, 0, 0]) + hello)
+        until(lambda: server.connected)
+        begin, waits = time.monotonic(), [0.0]
+        while server.connected and time.monotonic() < begin + 5.0:
+            before = time.monotonic()
+            server.send(Force(0.5))
+            waits.append(time.monotonic() - before)
+            time.sleep(0.01)
+        assert not server.connected
+        assert max(waits) < 1.0
+    server.close()
 
 
 def test_one_device_is_let_in_by_the_code_and_comes_back_by_its_token(server):
