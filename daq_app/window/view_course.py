@@ -268,8 +268,7 @@ def _rows(session: SessionState) -> tuple[PlanRow, ...]:
     rows: list[PlanRow] = []
     for block in session.plan.blocks:
         heading = tr("↑ away") if block.direction == PROXIMAL_TO_DISTAL else tr("↓ towards")
-        name = block.name if block.phase == "main" else f"{block.name}, {block.phase}"
-        rows.append(PlanRow("block", "", name, heading))
+        rows.append(PlanRow("block", "", block.name, heading))
         numbers = {trial.number for trial in block.trials}
         rows += [_row(session, trial) for trial in session.trials if trial.trial.number in numbers]
     return tuple(rows)

@@ -8,7 +8,8 @@ import pytest
 from killed_process import fork, kill, lines_of
 from recordings import INFO, PLAN, TRIAL, new_writer
 
-from daq_app.recorder.messages import People, StartSession
+from daq_app.recorder.messages import People, SessionBegun, StartSession
+from daq_app.window.course_state import begin_session
 from daq_app.window.new_session import (
     Bench,
     Refusal,
@@ -21,6 +22,8 @@ from daq_app.window.new_session import (
     refusals,
     unfinished_sessions,
 )
+from daq_app.window.state import BenchState
+from daq_app.window.view_course import course_view
 from sessions.plan.plan import Frame
 from sessions.plan.protocols.planning import Body
 from sessions.plan.protocols.protocol import protocol_file, protocol_names
@@ -196,6 +199,15 @@ def test_pre_evaluation_and_practice_are_offered_where_the_protocol_has_them_and
     request = check_form(replace(FORM, pre_evaluation=True, practice=True), REAL, NOW, 0).plan
     phases = list(dict.fromkeys(trial.phase for trial in request.trials))
     assert phases == ["pre-evaluation", "practice", "main"]
+    rows = course_view(begin_session(SessionBegun("", request, "people", None, 0), 0.0), BenchState(), 0.0).rows
+    assert [row.name for row in rows if row.kind == "block"] == [
+        "stickiness, pre-evaluation",
+        "slipperiness, pre-evaluation",
+        "stickiness, practice",
+        "stickiness",
+        "slipperiness, practice",
+        "slipperiness",
+    ]
     bare = tmp_path / "bare.toml"
     lines = protocol_file("sensotact-friction").read_text(encoding="utf-8").splitlines()
     bare.write_text("\n".join(line for line in lines if not line.startswith("practice")), encoding="utf-8")
