@@ -237,6 +237,7 @@ class NumberField(_Field):
         self.point = "."  # of the subject's language
         self.field = entry(Text.OWN_NUMBER)
         self.field.setFixedWidth(px(260))
+        self.field.setContextMenuPolicy(Qt.ContextMenuPolicy.NoContextMenu)  # its words are not the subject's language
         self.field.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.field.setStyleSheet(f"font-size: {px(_LARGE)}px;")
         self.field.setValidator(QRegularExpressionValidator(_NUMBER, self.field))

@@ -209,7 +209,8 @@ class Keyboard(QObject):
             QApplication.sendEvent(field, event)
             return True
         is_ours = key_owner == "course" or not self._subject.scoring
-        return watched is self._subject and is_ours and self.press(event)
+        last = (self._subject, self._subject.number.field)  # the field keeps a letter that is no number
+        return watched in last and is_ours and self.press(event)
 
     def _owner(self, event: QKeyEvent, *, from_subject: bool = False) -> Owner:
         typing, by_keys = self.focused_field() is not None, self._answered_by_keys()

@@ -135,6 +135,20 @@ def begin_scoring(driver):
     driver.go_on("scoring")
 
 
+def test_the_keys_of_the_course_work_in_the_field_where_the_subject_types_a_number(driver):
+    window = driver.window
+    window.page.protocol.setCurrentText("magnitude-estimation")
+    begin_scoring(driver)
+    field = window.subject.number.field
+    QTest.keyClicks(field, "20")
+    QTest.keyClick(field, Qt.Key.Key_N)
+    assert window.course.asking
+    QTest.keyClick(window.course.line, ESCAPE)
+    assert field.text() == "20"
+    QTest.keyClick(field, Qt.Key.Key_P)
+    driver.phase("paused")
+
+
 def test_a_number_that_reaches_the_experimenters_window_is_typed_whole_and_its_0_is_no_refusal(driver):
     window = driver.window
     window.page.protocol.setCurrentText("magnitude-estimation")
