@@ -8,7 +8,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QGuiApplication, QKeyEvent, QResizeEvent
-from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QMainWindow, QWidget
+from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QMainWindow, QScrollArea, QWidget
 
 from daq_app.qt.bench_panel import BenchPanel, BenchStrip
 from daq_app.qt.bridge import Bridge
@@ -323,9 +323,10 @@ class MainWindow(QMainWindow):
         self.keys.fit()
 
     def _scroll_to(self, field: QWidget) -> None:
-        """Scroll the panels to a text field, once it has its place."""
-        if self._below.isAncestorOf(field):
-            QTimer.singleShot(0, field, lambda: self._below.ensureWidgetVisible(field))
+        """Scroll to a text field, once it has its place: the innermost area around it first."""
+        for area in reversed(self.findChildren(QScrollArea)):
+            if area.isAncestorOf(field):
+                QTimer.singleShot(0, field, partial(area.ensureWidgetVisible, field))
 
     def _lay_out(self) -> QWidget:
         window = QWidget()

@@ -107,6 +107,15 @@ def test_of_a_window_lower_than_its_panels_all_can_be_scrolled_to(driver):
         assert widget.height() >= widget.minimumHeight()
 
 
+def test_in_the_lowest_window_a_field_that_the_program_goes_to_is_seen(driver):
+    window, field = driver.window, driver.window.page.folder
+    window.resize(683, 384)
+    driver.application.processEvents()
+    assert field.visibleRegion().isEmpty()
+    field.setFocus()
+    driver.until(lambda: field.visibleRegion().boundingRect() == field.rect(), "the whole field")
+
+
 def test_in_the_lowest_window_a_session_begins_at_its_plans_top_and_a_note_is_typed_where_it_is_seen(driver):
     window = driver.window
     window.resize(683, 384)
