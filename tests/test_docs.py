@@ -2,10 +2,14 @@
 
 import importlib
 import re
+import tomllib
+from importlib import metadata
 from pathlib import Path
 
 import msgspec
 import pytest
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
 
 from daq_app.accuracy_page.page import PAGES as TABLES
 from daq_app.accuracy_page.page import fill_marks
@@ -82,6 +86,18 @@ def test_every_number_of_a_study_has_a_meaning_in_the_reference(monkeypatch):
 def test_readme_names_every_verb():
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     assert [verb for verb in VERBS if not re.search(rf"`(\w+`, `)*{verb}\b", readme)] == []
+
+
+def test_every_pinned_package_runs_on_the_first_release_of_the_python_that_readme_asks_for():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    oldest = project["requires-python"].removeprefix(">=")
+    assert f"Python {oldest} or later" in (ROOT / "README.md").read_text(encoding="utf-8")
+    pins = [Requirement(line) for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()]
+    installed = {d.metadata["Name"].lower().replace("_", "-"): d for d in metadata.distributions()}
+    here = [(pin, installed[pin.name]) for pin in pins if pin.name in installed]
+    pythons = {str(pin): d.metadata["Requires-Python"] or "" for pin, d in here if pin.specifier.contains(d.version)}
+    assert len(pythons) > 50
+    assert [pin for pin, python in pythons.items() if not SpecifierSet(python).contains(f"{oldest}.0")] == []
 
 
 def test_readme_names_an_address_of_every_driver():
