@@ -41,7 +41,7 @@ VERBS = {
     "report": "write a session's report as one page",
     "study": "pool many sessions: group statistics, a page, a table of all trials",
     "translate": "write the file that a translator fills in",
-    "export": "write a session as CSV, BIDS, HDF5 or NWB",
+    "export": "write a session for other programs",
     "selftest": "test crash safety on this computer and disk, and write a certificate",
     "simulate": "serve a simulated device, to try a driver without hardware",
     "unblind": "open the sealed key of a blinded study or session",

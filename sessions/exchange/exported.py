@@ -141,17 +141,19 @@ def read_export(path: Path) -> ExportedSession | None:
         raise ImportRefused(f"{path} is a session folder already: every verb takes it as it is")
     if path.name == LIVE_FILE:
         raise ImportRefused(f"{path} is the live file of a session: every verb takes its folder, {path.parent}")
-    for module in map(importlib.import_module, FORMATS.values()):
-        file = module.find(path) if hasattr(module, "find") else None
+    modules = {name: importlib.import_module(module) for name, module in FORMATS.items()}
+    restored = {name: module for name, module in modules.items() if hasattr(module, "find")}
+    for module in restored.values():
+        file = module.find(path)
         if file is not None and path.exists():
             try:
                 return module.read(file)
             except _DAMAGED as error:
                 raise _refusal(f"{path} cannot be read as an export", error) from error
     if path.suffix == ".nwb" or any(path.glob("*.nwb")):
-        raise ImportRefused(f"{path} is an export for other programs alone; give one as csv, bids or hdf5")
+        raise ImportRefused(f"{path} is an export for other programs alone; give one of {', '.join(restored)}")
     if path.is_dir():
-        raise ImportRefused(f"{path} holds no export of this program; give one, or a CSV file")
+        raise ImportRefused(f"{path} holds no export of this program; give one of {', '.join(restored)}, or a CSV file")
     return None
 
 

@@ -132,7 +132,8 @@ def _common_unit(quantity: str, header_units: set[str | None], option: str | Non
     names = header_units - {None}
     units = ", ".join(factors)
     if len(names) > 1 or (names and None in header_units and option is None):
-        raise ColumnsUnknown(f"the header does not name one unit for all {quantity}: make the file's columns agree")
+        unit_names = " and ".join(f'"{name}"' if name else "no unit" for name in sorted(header_units, key=str))
+        raise ColumnsUnknown(f"the header has {unit_names} for the {quantity}: convert the columns to one of {units}")
     (headed_unit,) = names or (None,)
     unit = headed_unit or option
     if unit is None:

@@ -320,7 +320,7 @@ def test_an_export_that_does_not_come_back_is_said_to_be_one(tmp_path, capsys, n
     (tmp_path / "nwb").mkdir()
     (tmp_path / "nwb" / "session.nwb").write_bytes(b"\x89HDF")
     assert run(["import", str(tmp_path / name), "--out", str(tmp_path / "again")]) == 1
-    assert "is an export for other programs alone; give one as csv, bids or hdf5" in capsys.readouterr().err
+    assert "is an export for other programs alone; give one of csv, bids, hdf5" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

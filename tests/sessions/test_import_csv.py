@@ -175,6 +175,12 @@ def test_units_that_contradict_the_header_are_refused(tmp_path):
     assert "Nm, but --units says Nmm" in sentence
 
 
+@pytest.mark.parametrize(("heading", "units"), [("Fx_mN", '"N" and "mN"'), ("Fx", '"N" and no unit')])
+def test_forces_in_more_than_one_unit_are_refused_by_the_names_of_the_units(tmp_path, heading, units):
+    sentence = refusal(tmp_path, SettingsError, header=HEADER.replace("Fx_N", heading))
+    assert f"the header has {units} for the forces" in sentence
+
+
 @pytest.mark.parametrize("unit", ["V", "lbf", "Nm", "counts"])
 def test_forces_in_an_unknown_unit_are_refused(tmp_path, unit):
     header = HEADER.replace("_N,", f"_{unit},")

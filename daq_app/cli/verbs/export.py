@@ -1,7 +1,7 @@
 """Export a session for other programs, in one of the formats of --format.
 
-The stored analysis.json and prediction.json are exported too; an analysis that was not stored is computed. An export
-as csv, bids or hdf5 can be imported again as the same session.
+The stored analysis.json and prediction.json are exported too; an analysis that was not stored is computed. Most
+formats hold the whole session: 'daq-app import' makes the same session of such an export.
 """
 
 import argparse

@@ -1,8 +1,9 @@
 """Make a session folder from a foreign recording or from an export of this program; every other verb accepts it.
 
-An export (a csv or bids folder, or a file session.h5) is restored completely and compared reading by reading; it needs
-no options. A foreign CSV file needs none either if its header names units and a time column (t_s, Fx_N ... Tz_Nm):
-N = -Fz and height 0 are then assumed, and marked as defaults. Otherwise give the columns, their units and their rate.
+An export that holds the whole session (such as a csv folder, or a file session.h5) is restored completely and compared
+reading by reading; it needs no options. A foreign CSV file needs none either if its header names units and a time
+column (t_s, Fx_N ... Tz_Nm): N = -Fz and height 0 are then assumed, and marked as defaults. Otherwise give the columns,
+their units and their rate.
 """
 
 import argparse
