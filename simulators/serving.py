@@ -16,7 +16,7 @@ import msgspec
 import simulators
 from drivers.arrays import Array
 from drivers.clock import clock_at
-from simulators.bench import Bench, BenchSettings
+from simulators.bench import Bench
 from simulators.faults import Fault, Faults, Time
 from simulators.simulator import RunningSimulator, Simulator
 from simulators.stroke import CONTACT_AREA, Surface, paper_surfaces
@@ -53,9 +53,9 @@ class Timetable:
 class ScriptedBench(Bench):
     """A bench stroked by one subject according to a timetable."""
 
-    def __init__(self, seed: int, timetable: Timetable, settings: BenchSettings | None = None) -> None:
+    def __init__(self, seed: int, timetable: Timetable) -> None:
         """Begin the timetable at the bench's time 0. The seed sets the noise and the subject."""
-        super().__init__(seed, settings)
+        super().__init__(seed)
         self._timetable = timetable
         self._subject = SimulatedSubject(seed)
         self._stroke_count = 0  # so far

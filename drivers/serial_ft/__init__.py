@@ -22,6 +22,7 @@ from drivers.transducer import DeviceFault, LinkLost, TransducerInfo
 _SETTLED = 0.05  # of silence after a prompt that distinguish it from a byte of a record
 _BETWEEN = 0.02  # between two commands
 _ANSWER = 0.6  # for the answer to a command
+_PROMPT = 0.2  # for its prompt
 _BANNER = 6.0  # for the controller's start-up text
 _SILENT = 0.02  # after the prompt that ends a stream
 _END = 0.08  # for the prompt after a stream
@@ -182,9 +183,9 @@ class _ControllerConversation:
         raise LinkLost("the controller does not begin to stream; switch it off and on")
 
 
-def has_prompt(link: Link, tries: int = _TRIES, patience: float = 0.2) -> bool:
+def has_prompt(link: Link, tries: int = _TRIES) -> bool:
     """Say whether a controller answers with its prompt; this ends any stream."""
-    return any(_reply(link, wire.RETURN, patience).rstrip().endswith(wire.PROMPT) for _ in range(tries))
+    return any(_reply(link, wire.RETURN, _PROMPT).rstrip().endswith(wire.PROMPT) for _ in range(tries))
 
 
 def banner(link: Link) -> str:
