@@ -14,6 +14,7 @@ myst_heading_anchors = 4
 html_theme = "furo"
 html_static_path, html_css_files = ["_static"], ["tables.css"]
 html_title = "daq-app"
+html_show_copyright = False  # the licence is in LICENSE
 exclude_patterns = ["_build"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
