@@ -260,8 +260,8 @@ def test_a_sentence_names_those_rivals_whose_p_allows_for_all_of_them():
     ]
     (sentence,) = rivals_sentences("roughness", [Rival(MODEL_SED, 50, 0.9, 0.8, 0.95), *rivals])
     assert sentence == (
-        "On roughness, the scores follow N less closely than the SED (p < 0.05 by Holm over 3 rivals); they do not "
-        "distinguish the SED from T and speed."
+        "On roughness, the scores follow N less closely than the SED (p < 0.05 by Holm over 3 rivals); they "
+        "distinguish the SED from none of these: T and speed."
     )
 
 

@@ -122,7 +122,7 @@ def _verdict(name: str, model: str, rivals: Sequence[Rival]) -> str:
         )
     if sides["neither"]:
         subject = "they" if clauses else "the scores"
-        sentences.append(f"{subject} do not distinguish the {model} from {_rival_names(sides['neither'])}")
+        sentences.append(f"{subject} distinguish the {model} from none of these: {_rival_names(sides['neither'])}")
     return f"On {name}, {'; '.join(sentences)}."
 
 
