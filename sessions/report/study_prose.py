@@ -25,6 +25,7 @@ from sessions.report.wording import (
     reversal_sentence,
     shown_response,
     significant,
+    spread_share,
 )
 from sessions.statistics.correlations import LEAST_CASES
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
@@ -115,10 +116,11 @@ def _relation_sentences(findings: DescriptorFindings, study: StudyFindings) -> l
     people = findings.single_subject or plural(len({subject for subject, *_ in findings.points}), "subject")
     level = "" if findings.single_subject else "within subjects, "
     surfaces = plural(len({index for _, index, *_ in findings.points}), "surface")
+    means = [surface.response.mean for surface in findings.surfaces if surface.response is not None]
     return [
         f"{name}: {level}score and the {label} predicted at {strain} strain go together by "
         f"r = {correlation(repeated.r)} over {plural(len(findings.points), 'trial')} of {people} on {surfaces}, "
-        f"{interval}; "
+        f"{interval}; over the surfaces the mean {label} has a range of {spread_share(min(means), max(means))}; "
         f"{_otherwise(findings, other_strain)}.",
         *_subsets(findings),
         *([reversal_sentence(findings.descriptor, falling, len(findings.answers))] if falling else []),

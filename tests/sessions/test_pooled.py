@@ -291,6 +291,11 @@ def test_the_headline_says_whether_the_other_strain_was_tried_and_what_it_gave()
     assert "over the 20 trials with a prediction there" in sentence
 
 
+def test_the_headline_states_the_range_of_the_mean_sed_over_the_surfaces():
+    visits = [replace(v, rows=tuple(replace(row, sed=5.0 + row.index / 1000) for row in v.rows)) for v in VISITS[:4]]
+    assert "over the surfaces the mean SED has a range of 2.0 %;" in summary(pool_visits(visits))[1]  # 5.0 to 5.1
+
+
 def opposite(v):
     """Return a visit whose SEDs have the other sense at finite strain."""
     rows = (replace(row, rule="maximum", paths=tuple(SENSE[p.kinematics] * row.sed for p in PATHS)) for row in v.rows)
