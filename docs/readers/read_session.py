@@ -10,11 +10,12 @@ import sqlite3
 import struct
 import sys
 import zlib
+from pathlib import Path
 
 
 def read(folder):
     """Return a dict: simulated, plan, transducer, readings (a list of tuples), events (a list of dicts), damaged."""
-    file = sqlite3.connect(f"file:{folder}/session.sqlite?mode=ro", uri=True)
+    file = sqlite3.connect(Path(folder, "session.sqlite").resolve().as_uri() + "?mode=ro", uri=True)
     header = dict(file.execute("SELECT name, value FROM head"))
     transducer = json.loads(header["transducer"])
     matrix = transducer["calibration"]["matrix"] if transducer else None
@@ -48,6 +49,8 @@ def read(folder):
 
 
 if __name__ == "__main__":
+    if not Path(sys.argv[-1], "session.sqlite").is_file():
+        sys.exit(f"{sys.argv[-1]} has no session.sqlite; give the folder of a session")
     session = read(sys.argv[1])
     if session["simulated"]:
         print(session["simulated"])

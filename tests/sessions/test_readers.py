@@ -53,6 +53,18 @@ def test_python_alone_reads_the_live_file(session):
     check(stdout([sys.executable, "-I", READERS / "read_session.py", session]), session)
 
 
+def test_python_alone_reads_a_folder_of_any_name(session, tmp_path):
+    folder = shutil.copytree(session, tmp_path / "P07 #2, 50%?")
+    check(stdout([sys.executable, "-I", READERS / "read_session.py", folder]), session)
+
+
+def test_python_alone_refuses_a_folder_without_a_recording_in_one_sentence(tmp_path):
+    words = [sys.executable, "-I", READERS / "read_session.py", tmp_path]
+    result = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stdout) == (1, "")
+    assert result.stderr == f"{tmp_path} has no session.sqlite; give the folder of a session\n"
+
+
 def test_python_alone_names_what_is_damaged(session, tmp_path):
     folder = shutil.copytree(session, tmp_path / "s")
     change(folder, "UPDATE blocks SET raw = zeroblob(length(raw)) WHERE number = 2")
