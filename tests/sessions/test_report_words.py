@@ -213,6 +213,23 @@ def test_a_table_whose_intervals_were_not_asked_for_says_so_once(report):
         assert whole.notes.count(("", "No interval: none was asked for (--intervals).")) == 1
 
 
+def test_the_captions_of_predictions_explain_intervals_only_where_they_were_computed(report):
+    def without(p):
+        alternatives = tuple(replace(a, interval=None) for a in p.alternatives)
+        intervals = {"interval": None, "opposite_interval": None, "matching_depth_interval": None}
+        return replace(p, alternatives=alternatives, **intervals)
+
+    unasked = replace(report, predictions=tuple(map(without, report.predictions)))
+    for name in ("prediction", "afferent", "variants", "variant_forces", "force", "direction"):
+        table = getattr(of_predictions, f"{name}_table")
+        explained, bare = (
+            " ".join((one.caption, *(note for mark, note in one.notes if not mark)))
+            for one in map(table, (report, unasked))
+        )
+        assert "95 % interval" in explained, name
+        assert "95 % interval" not in bare, name
+
+
 def test_an_exact_p_below_a_thousandth_is_not_shown_as_zero(report):
     sticky = report.experiments[0]
     small = replace(sticky.score_relation, spearman_p=2.0 / 3_628_800)  # ten surfaces in perfect order: 2 of 10!

@@ -20,7 +20,17 @@ from sessions.report.tables import (
     number_cell,
     table,
 )
-from sessions.report.wording import ShownResponse, direction, places, sed, shown_response, significant, tau, with_error
+from sessions.report.wording import (
+    ShownResponse,
+    caption,
+    direction,
+    places,
+    sed,
+    shown_response,
+    significant,
+    tau,
+    with_error,
+)
 from sessions.statistics.scores import bounds
 
 
@@ -52,11 +62,11 @@ def prediction_table(report: Report) -> Table | None:
             number_cell(prediction.wall_s, lambda v: significant(v, 2), prediction.reasons.get("wall_s")),
         )
 
-    return _table(report, "table-predictions", "predictions", columns, _rows(report, row))
+    intervals = [p.interval for p in report.predictions]
+    return _table(report, "table-predictions", "predictions", columns, _rows(report, row), intervals)
 
 
 _INTERVAL_METHOD = "by derivatives (the solver's converged tangent), or where marked * by solving draws"
-_UNDER_RATES = "Under each number: the 95 % interval that friction's uncertainty makes of it, parameters as given; "
 _SED_ALONE = "the uncertainty of friction goes through to the SED alone"
 
 
@@ -122,8 +132,8 @@ def afferent_table(report: Report) -> Table | None:
             cell(prediction.settled_rate, prediction.settled_rate_interval),
         )
 
-    texts = {"label": quantity.label, "below": _UNDER_RATES if published else ""}
-    return _table(report, "table-afferent", "afferent", columns, _rows(report, row), **texts)
+    intervals = [p.interval for p in report.predictions] if published else []
+    return _table(report, "table-afferent", "afferent", columns, _rows(report, row), intervals, label=quantity.label)
 
 
 def _response_cell(prediction: PredictionFinding, quantity: ShownResponse) -> Cell:
@@ -144,7 +154,9 @@ def variants_table(report: Report) -> Table | None:
     labels = dict.fromkeys(variant.conditions for variant in _variants(report))
     legend = "; ".join(f"({n}) {label}" for n, label in enumerate(labels, 1))
     columns = " | ".join(f"({n}) [kPa]" for n in range(1, len(labels) + 1))
-    return _table(report, "table-beside", "variants", columns, _by_strain(report, cell), legend=legend)
+    return _table(
+        report, "table-beside", "variants", columns, _by_strain(report, cell), _variant_intervals(report), legend=legend
+    )
 
 
 def variant_forces_table(report: Report) -> Table | None:
@@ -162,13 +174,18 @@ def variant_forces_table(report: Report) -> Table | None:
 
     units = {variant.conditions: "mm" if variant.driven == "force" else "N" for variant in _variants(report)}
     columns = " | ".join(f"({n}) [{unit}]" for n, unit in enumerate(units.values(), 1))
-    return _table(report, "table-beside-forces", "variant-forces", columns, _by_strain(report, cell))
+    rows, intervals = _by_strain(report, cell), _variant_intervals(report)
+    return _table(report, "table-beside-forces", "variant-forces", columns, rows, intervals)
 
 
 def _variants(report: Report) -> list[Variant]:
     """Return the variants of the trials, the same at each strain; [] without any."""
     alternatives = next((p.alternatives for p in report.predictions if p.alternatives), ())
     return [alternative.variant for alternative in alternatives]
+
+
+def _variant_intervals(report: Report) -> list[SedInterval | None]:
+    return [alternative.interval for p in report.predictions for alternative in p.alternatives]
 
 
 def _by_strain(report: Report, cell: Callable[[Alternative], Cell]) -> list[Rows]:
@@ -217,7 +234,8 @@ def force_table(report: Report) -> Table | None:
 
     origin = f" ({report.width_origin})" if report.width_origin else ""
     width = "the finger's width" if report.width is None else f"a width of {report.width:g} mm{origin}"
-    return _table(report, "table-forces", "forces", columns, _rows(report, row), width=width)
+    intervals = [ends for p in report.predictions for ends in (p.interval, p.matching_depth_interval)]
+    return _table(report, "table-forces", "forces", columns, _rows(report, row), intervals, width=width)
 
 
 _OF_STATE = ("normal_per_mm", "normal_force", "tangential_force")  # the depth to match belongs to another state
@@ -244,7 +262,8 @@ def direction_table(report: Report) -> Table | None:
             estimate_cell(ratio, places(3), reason, None if doubt else interval, without),
         )
 
-    return _table(report, "table-directions", "directions", columns, _rows(report, row))
+    intervals = [interval for p in report.predictions for interval in (p.interval, p.opposite_interval)]
+    return _table(report, "table-directions", "directions", columns, _rows(report, row), intervals)
 
 
 def _ratio(prediction: PredictionFinding) -> tuple[float | None, Ends | None]:
@@ -260,12 +279,23 @@ def _ratio(prediction: PredictionFinding) -> tuple[float | None, Ends | None]:
 
 
 def _table(
-    report: Report, name: str, caption: str, columns: str, groups: Iterable[Rows], **values: str
+    report: Report,
+    name: str,
+    caption_name: str,
+    columns: str,
+    groups: Iterable[Rows],
+    intervals: Iterable[object],
+    **values: str,
 ) -> Table | None:
-    """Return a table with rows named by trial and index, or by the stroke without trials."""
+    """Return a table with rows named by trial and index, or by the stroke without trials.
+
+    Its caption explains the `intervals` under its numbers unless all are None: nobody asked for them.
+    """
+    computed = any(interval is not None for interval in intervals)
+    under = caption(f"{caption_name}-under", how=_INTERVAL_METHOD) if computed else ""
     planned = any(p.trial is not None for p in report.predictions)
     columns = f"{'trial | index' if planned else 'stroke'} | {columns}"
-    return table(name, caption, columns, groups, how=_INTERVAL_METHOD, model=report.model, **values)
+    return table(name, caption_name, columns, groups, under=under, model=report.model, **values)
 
 
 def _rows(report: Report, row: Callable[[PredictionFinding], Row]) -> list[Rows]:
