@@ -88,10 +88,11 @@ EACH_EVENT = "a row for each thing that happened, in order"
 def heading(name: str, unit: str) -> str:
     """Return a column's name with its unit at the end, in characters that any program accepts.
 
-    >>> heading("speed", "mm/s"), heading("torque", "N mm"), heading("mu", "")
-    ('speed_mm_per_s', 'torque_Nmm', 'mu')
+    >>> heading("speed", "mm/s"), heading("torque", "N mm"), heading("mu", ""), heading("wall_s", "s")
+    ('speed_mm_per_s', 'torque_Nmm', 'mu', 'wall_s')
     """
-    return f"{name}_{unit.replace('/', '_per_').replace(' ', '')}" if unit else name
+    suffix = f"_{unit.replace('/', '_per_').replace(' ', '')}" if unit else ""
+    return name if name.endswith(suffix) else name + suffix
 
 
 @dataclass(frozen=True, slots=True)

@@ -157,7 +157,7 @@ class TrialNumbers:
     measured_tangential: Annotated[Number, Meaning("N", "mean over the steady window")]
     matching_depth: Annotated[Number, Meaning("mm", "indentation at which the model presses as was measured")] = None
     opposite_sed: Annotated[Number, Meaning("MPa", "slid the other way")] = None
-    wall_s: Annotated[Number, Meaning("", "time the solve took, in s")] = None
+    wall_s: Annotated[Number, Meaning("s", "time the solve took")] = None
     reasons: Annotated[Mapping[str, str], Meaning("", "for each number left out, why")] = field(
         default_factory=dict[str, str]
     )

@@ -47,6 +47,12 @@ def test_an_interval_of_the_sed_is_two_cells_or_the_reason_why_there_is_none(sou
             assert cells.unit == ("" if suffix == "by" else "MPa")
 
 
+def test_the_time_of_a_solve_has_its_unit_once(source):
+    with_prediction = ExportSource(source.recording, source.analysis, {"trials": [{"trial": 1, "wall_s": 0.05}]})
+    cells = column(with_prediction, "predictions", "wall_s")
+    assert (cells.unit, cells.heading, cells.values) == ("s", "wall_s", (0.05,))
+
+
 @pytest.mark.parametrize("later", [{"version": 99}, {"name": "of another program"}])
 def test_an_export_of_another_format_or_a_later_version_is_refused(source, tmp_path, later):
     folder = export(source, "csv", tmp_path / "out")

@@ -231,7 +231,7 @@ def test_an_export_that_was_stopped_leaves_nothing(sources, tmp_path, form):
 
 
 def test_every_float_column_has_a_unit_or_is_known_to_have_none(sources):
-    bare = {"score", "corrections", "position", "error_estimate", "wall_s"}
+    bare = {"score", "corrections", "position", "error_estimate"}
     for table in tables(sources["whole"]):
         for column in table.columns:
             if any(isinstance(value, float) for value in column.values) and not column.unit:
