@@ -24,7 +24,8 @@ from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording
 from sessions.recording.derived import reveal
 from sessions.recording.head import software_versions
-from sessions.report import findings
+from sessions.recording.manifest import seal_differences
+from sessions.report import Further, findings
 from sessions.report.contents import Field, Report
 from sessions.report.trials import field_of, finding_of
 from sessions.strokes import analyse
@@ -284,7 +285,8 @@ class Work:
             progress = self.progress_listener(tr("carrying the uncertainty of friction through"))
             with_them = replace(self._prediction, options=replace(self._prediction.options, intervals=True))
             self._prediction = with_intervals(with_them, progress)
-            pages.write_report(findings(self._recording, self._analysis, self._prediction), path)
+            further = Further(seal_differences=seal_differences(self._recording))
+            pages.write_report(findings(self._recording, self._analysis, self._prediction, further=further), path)
             return str(path)
         made_by = {"made_by": software_versions()}
         documents = made_by | analysis_document(self._analysis), made_by | self._prediction.to_dict()

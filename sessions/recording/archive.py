@@ -6,12 +6,18 @@ from pathlib import Path
 
 from sessions.file_access import json_value, put_in_place, read_within_limit, remedy, write_whole
 from sessions.recording.derived import ABSENT, unlike
-from sessions.recording.manifest import changed_files, description, head_of_manifest, is_sealed, list_in_manifest
+from sessions.recording.manifest import (
+    SEALED,
+    changed_files,
+    description,
+    head_of_manifest,
+    is_sealed,
+    list_in_manifest,
+)
 from sessions.recording.reader import Recording
 from sessions.recording.recovery import fold_log
 from sessions.recording.schema import (
     DESCRIPTION_FILE,
-    LIVE_FILE,
     MANIFEST_FILE,
     SEALED_FILE,
     DiskRefused,
@@ -19,8 +25,6 @@ from sessions.recording.schema import (
 )
 from sessions.recording.sealed_copy import differences, write_copy
 from sessions.recording.storage import release_reserve
-
-SEALED = (LIVE_FILE, SEALED_FILE, DESCRIPTION_FILE)
 
 
 def seal(folder: Path) -> None:

@@ -13,13 +13,13 @@ from sessions.file_access import as_type, json_object, json_text, name_failure, 
 from sessions.plan.study import Key
 from sessions.recording.head import software_versions
 from sessions.recording.log import trial_records
-from sessions.recording.manifest import is_sealed, list_in_manifest
+from sessions.recording.manifest import SEALED, is_sealed, list_in_manifest
 from sessions.recording.reader import Recording
-from sessions.recording.schema import DESCRIPTION_FILE, LIVE_FILE, MANIFEST_FILE, SEALED_FILE, RecordingError
+from sessions.recording.schema import LIVE_FILE, MANIFEST_FILE, RecordingError
 from sessions.toml_file import SettingsError
 
 T = TypeVar("T")
-RECORDED = (LIVE_FILE, SEALED_FILE, DESCRIPTION_FILE, MANIFEST_FILE)
+RECORDED = (*SEALED, MANIFEST_FILE)
 
 
 def store_derived(folder: Path, name: str, data: Mapping[str, Any]) -> Path:

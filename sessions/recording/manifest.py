@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -15,7 +15,16 @@ from sessions.file_access import as_type, json_object, name_failure, one_at_a_ti
 from sessions.recording.head import compact_json
 from sessions.recording.log import LoggedEvent, TrialRecord
 from sessions.recording.reader import Recording
-from sessions.recording.schema import COLUMNS, MANIFEST_FILE, RecordingError
+from sessions.recording.schema import (
+    COLUMNS,
+    DESCRIPTION_FILE,
+    LIVE_FILE,
+    MANIFEST_FILE,
+    SEALED_FILE,
+    RecordingError,
+)
+
+SEALED = (LIVE_FILE, SEALED_FILE, DESCRIPTION_FILE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,8 +132,11 @@ def list_in_manifest(folder: Path, names: Iterable[str], head: dict[str, Any] | 
         write_whole(folder / MANIFEST_FILE, json.dumps(document, indent=1).encode() + b"\n")
 
 
-def changed_files(recording: Recording) -> Iterator[str]:
-    """Yield a sentence for each listed file that is missing or changed, and one for a damaged manifest."""
+def changed_files(recording: Recording, names: Container[str] | None = None) -> Iterator[str]:
+    """Yield a sentence for each listed file that is missing or changed, and one for a damaged manifest.
+
+    With `names` only these files are read.
+    """
     try:
         document = _manifest(recording.folder)
     except RecordingError as damaged:
@@ -132,12 +144,27 @@ def changed_files(recording: Recording) -> Iterator[str]:
         return
     for name, digest in document.pop("files").items():
         path = recording.folder / name
+        if names is not None and name not in names:
+            continue
         if not path.is_file():
             yield f"{name} is listed in {MANIFEST_FILE} and missing"
         elif file_sha256(path) != digest["sha256"] or path.stat().st_size != digest["bytes"]:
             yield f"{name} is not what it was when it was listed: its SHA-256 or size differs from {MANIFEST_FILE}"
     if document != head_of_manifest(recording):
         yield f"the head of {MANIFEST_FILE} differs from the live file"
+
+
+def seal_differences(*recordings: Recording) -> tuple[str, ...]:
+    """Return a sentence for each sealed recording that is not as it was sealed.
+
+    It reads each sealed file once, for its SHA-256; `archive.problems` also compares every number.
+    """
+    sealed = (recording for recording in recordings if is_sealed(recording.folder))
+    changes = ((recording.folder.name, next(changed_files(recording, SEALED), "")) for recording in sealed)
+    advice = "'daq-app verify' names every difference"
+    return tuple(
+        f"The recording {name} is not as it was sealed ({change}); {advice}." for name, change in changes if change
+    )
 
 
 class _ListedFile(msgspec.Struct):

@@ -45,6 +45,7 @@ class Further:
     firing_settings: AfferentSettings | None = None  # settings of the firing; None: no firing requested
     response: str = SED.name  # the quantity at the ending that is compared with scores
     paths: Mapping[int, Values] | None = None  # trial -> that quantity along many paths of the analysis
+    seal_differences: tuple[str, ...] = ()  # a sentence for each recording that differs from its seal
     unreadable: tuple[str, ...] = ()  # a sentence for each session of the study that cannot be read
 
 
@@ -72,6 +73,7 @@ def findings(
         unscored,
         title=f"{plan.protocol}, subject {plan.subject}" if plan.blocks else f"Recording {recording.folder.name}",
         head=_simulation_notice(recording, tables),
+        seal_differences=extras.seal_differences,
         people=facts.people(recording, tables),
         apparatus=facts.apparatus(recording, analysis),
         excluded=(

@@ -155,6 +155,7 @@ class Report:
     title: str = ""
     session: str
     head: str = ""  # first line of every document on a simulated session; "" for a real one
+    seal_differences: tuple[str, ...] = ()  # a sentence for each recording that differs from its seal
     sealed: str = ""  # whether predictions were sealed before scores
     people: tuple[Fact, ...] = ()
     apparatus: tuple[Fact, ...] = ()

@@ -168,7 +168,7 @@ def friction_question(quantity: str) -> str:
 
 def summary(report: Report) -> tuple[str, ...]:
     """Return the findings in short, a sentence each."""
-    sentences: list[str] = []
+    sentences = list(report.seal_differences)
     subjects = {subject for e in report.experiments for subject in e.answers}
     if subjects:
         stimuli = len({(mean.descriptor, mean.index) for e in report.experiments for mean in e.scores})

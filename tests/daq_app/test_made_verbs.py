@@ -143,6 +143,20 @@ def test_a_report_is_one_page_that_says_simulated_listed_in_the_manifest_and_kee
     assert any("report.html" in problem for problem in answer(capsys)["problems"])
 
 
+def test_a_report_of_a_recording_that_was_changed_since_it_was_sealed_says_so(report_dir, tmp_path, capsys):
+    session = shutil.copytree(report_dir, tmp_path / "P01")
+    assert "not as it was sealed" not in (session / "report.html").read_text()
+    copy = session / "session.h5"
+    copy.chmod(0o644)
+    copy.write_bytes(copy.read_bytes() + b"\0")
+    capsys.readouterr()
+    with patch("sessions.report.pages.plates", lambda _: ()):
+        assert run(["report", str(session)]) == 3
+    sentence = "The recording P01 is not as it was sealed (session.h5 is not what it was"
+    assert sentence in capsys.readouterr().err
+    assert sentence in (session / "report.html").read_text()
+
+
 def test_commands_and_scene_at_the_end_of_a_report_give_its_numbers(report_dir, two_trials, tmp_path, monkeypatch):
     text = (report_dir / "report.html").read_text()
     scene, commands = (html.unescape(part) for part in re.findall(r"<pre>(.*?)</pre>", text, re.DOTALL))

@@ -16,8 +16,8 @@ from recordings import PLAN, change, new_writer, readings, record_crash, record_
 from stand_ins import CALIBRATION, INFO
 
 from sessions.recording import Recording, RecordingError
-from sessions.recording.archive import SEALED, problems, seal
-from sessions.recording.manifest import list_in_manifest
+from sessions.recording.archive import problems, seal
+from sessions.recording.manifest import SEALED, list_in_manifest, seal_differences
 from sessions.recording.sealed_copy import read_texts, write_texts
 
 REAL = replace(INFO, simulated=False)
@@ -298,8 +298,12 @@ def test_one_changed_byte_in_any_file_is_named(sealed_dir, name):
     content = bytearray(path.read_bytes())
     place = content.rfind(b"42.5") if b"42.5" in content else len(content) // 2
     content[place] ^= 1
+    recording = Recording.open(sealed_dir)
+    assert seal_differences(recording) == ()
     path.write_bytes(content)
     assert any(problem.startswith(f"{name} is not what it was") for problem in problems(sealed_dir))
+    (sentence,) = seal_differences(recording)
+    assert f"not as it was sealed ({name} is not what it was" in sentence
 
 
 @pytest.mark.parametrize("name", ["session.json", "session.h5"])

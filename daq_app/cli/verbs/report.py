@@ -15,6 +15,7 @@ from sessions.prediction import BY_NAME
 from sessions.prediction.afferent import AfferentSettings, session_firing, usual_settings
 from sessions.recording import Recording
 from sessions.recording.derived import reveal, store_page
+from sessions.recording.manifest import seal_differences
 from sessions.report import Further
 from sessions.report.trials import afferent_facts
 from sessions.statistics.multiverse import trial_paths
@@ -62,6 +63,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         pages.make_place(recording.folder)
     if options.figures is not None:
         pages.make_place(options.figures)
+    differences = seal_differences(recording, *score_only)
+    console.note(*differences)
     analysis = analyse_session(recording, console, area_law(options), gain_error=options.calibration_error)
     afferent = stored_afferent(recording)
     if options.afferent and (afferent is None or afferent.quantity != options.quantity):
@@ -78,7 +81,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         finite, quantity = options.paths == "finite", BY_NAME[options.quantity]
         progress = console.reporter("many paths of the analysis", until=0.9)
         paths = trial_paths(recording, prediction, progress, finite=finite, quantity=quantity)
-    further = Further(firing, facts, afferent, options.quantity, paths, unreadable=unreadable)
+    further = Further(firing, facts, afferent, options.quantity, paths, differences, unreadable)
     report = findings(recording, analysis, prediction, [score_table(visit) for visit in score_only], further=further)
     console.progress(0.9, "drawing")
     drawings = pages.plates(report)
@@ -90,7 +93,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         pages.write_report(report, page, drawings)
     console.result(page=str(page), pictures=[str(path) for path in pictures], flaws=len(report.flaws))
     console.say(f"{page}{' (SIMULATED)' if report.simulated else ''}")
-    return FLAWED if analysis.flawed or unreadable else DONE
+    return FLAWED if analysis.flawed or unreadable or differences else DONE
 
 
 def _check_scores(visit: Recording, recording: Recording) -> None:
