@@ -11,7 +11,7 @@ from daq_app.qt.layout import hbox, set_horizontal
 from daq_app.qt.painting import Lamp, paint_arrow
 from daq_app.qt.parts import Panel, button, label, regrade, set_text
 from daq_app.qt.preferences import name_of
-from daq_app.qt.tokens import GRID, SMALL, TARGET, font, px, theme_of
+from daq_app.qt.tokens import GRID, HEADLINE, SMALL, TARGET, font, px, theme_of
 from daq_app.window.state import Message
 from daq_app.window.view import Banner, View
 from daq_app.window.view_course import Button
@@ -20,7 +20,7 @@ from daq_app.wording import tr, tr_noop
 _ONE_ROW = 1100  # width from which subject and lamp are in a row, before the font's scale [px]
 TWO_LINES = 4 * GRID  # of small type, before the font's scale [px]
 _ROOM = TARGET + 4  # height of the notice's line, a button and its margins, before the font's scale [px]
-_LEAST = 2 * GRID  # height of the current step without text [px]
+_LEAST = 2 * GRID  # height of the current step without text, where space is short [px]
 LEGIBLE = 4.0  # to read some twenty words, at five a second [s]
 _STROKES = tr_noop({1: "stroke away from the subject", -1: "stroke towards the subject", 0: "no stroke requested"})
 _MARKS = {"wrong": "■", "look": "▲"}  # before the sentence of a banner
@@ -138,7 +138,7 @@ class ToDo(Panel):
         self._painted = False
         self._arrow = Arrow()
         self.sentence = label("", "headline", wrap=True)
-        self.sentence.setMinimumHeight(_LEAST)
+        self._reserve_lines()
         self.primary = button("", tr("do it"), primary, "primary")
         self.second = button(tr("Review  F4"), tr("look at the session that has ended"), review)
         policy = self.primary.sizePolicy()
@@ -180,7 +180,12 @@ class ToDo(Panel):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         if event.size().width() != event.oldSize().width():
-            self.sentence.setMinimumHeight(_LEAST)
+            self._reserve_lines()
+
+    def _reserve_lines(self) -> None:
+        """Keep room for two lines, except where space is short: the steps differ in one or two."""
+        two_lines = 2 * QFontMetrics(font(HEADLINE)).lineSpacing()
+        self.sentence.setMinimumHeight(_LEAST if self._small else two_lines)
 
     def show_small(self, small: bool, *, stacked: bool) -> None:
         """Use smaller type if space is short, and put one button below the other if `stacked`."""
@@ -190,7 +195,7 @@ class ToDo(Panel):
             self._small = small
             regrade(self.sentence, "title" if small else "headline", "role")
             self.setMinimumHeight(0)
-            self.sentence.setMinimumHeight(_LEAST)
+            self._reserve_lines()
 
 
 class Arrow(QWidget):

@@ -88,6 +88,8 @@ class MainWindow(QMainWindow):
         for widget in self.findChildren(QAbstractButton):
             widget.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leaves Space to the primary button
         self.page.subject.setFocus()
+        for area in self.findChildren(QScrollArea):
+            area.verticalScrollBar().rangeChanged.connect(self._keep_in_sight)
         self._line_changed()
         self._fit()
 
@@ -327,6 +329,11 @@ class MainWindow(QMainWindow):
         for area in reversed(self.findChildren(QScrollArea)):
             if area.isAncestorOf(field):
                 QTimer.singleShot(0, field, partial(area.ensureWidgetVisible, field))
+
+    def _keep_in_sight(self) -> None:
+        """Scroll back to the text field in use after a page around it has changed its height."""
+        if (field := self.keyboard.focused_field()) is not None:
+            self._scroll_to(field)
 
     def _lay_out(self) -> QWidget:
         window = QWidget()

@@ -19,6 +19,7 @@ from daq_app.qt import answer_fields, preferences
 from daq_app.qt.keys import KEYS, act_of
 from daq_app.qt.live_panel import FINITE, LivePanel
 from daq_app.window.live_trace import CHANNELS
+from daq_app.window.new_session import UnfinishedSession
 from daq_app.window.view_course import Button
 from tests.daq_app.qt.written_text import controls, laid_over, unreached_controls
 
@@ -114,6 +115,39 @@ def test_in_the_lowest_window_a_field_that_the_program_goes_to_is_seen(driver):
     assert field.visibleRegion().isEmpty()
     field.setFocus()
     driver.until(lambda: field.visibleRegion().boundingRect() == field.rect(), "the whole field")
+
+
+def test_in_the_lowest_window_a_session_offered_late_leaves_the_field_in_use_in_sight(driver, tmp_path):
+    window, page = driver.window, driver.window.page
+    window.resize(683, 384)
+    driver.application.processEvents()
+    page.subject.setFocus()
+    driver.until(lambda: page.subject.visibleRegion().boundingRect() == page.subject.rect(), "the whole field")
+    page.cut_short.show_sessions((UnfinishedSession(tmp_path, "P03: 2 of 10 trials done"),))
+    try:
+        for _ in range(10):
+            driver.application.processEvents()
+        assert page.subject.visibleRegion().boundingRect() == page.subject.rect()
+    finally:
+        page.cut_short.show_sessions(())
+
+
+def test_the_panels_stay_in_place_when_the_current_step_takes_a_second_line(driver):
+    window, places = driver.window, []
+    window.resize(1366, 768)
+    two_lines = "Mount sample K3 with its arrow away from the subject, then press Space to measure the zero."
+    window.bridge.blockSignals(True)
+    try:
+        for sentence in ("Mount sample K3.", two_lines):
+            for _ in range(3):
+                window.to_do.show_what(sentence, None, 0)
+                driver.application.processEvents()
+            places.append(window._below.y())
+    finally:
+        window.bridge.blockSignals(False)
+    line = window.to_do.sentence.fontMetrics().horizontalAdvance(two_lines)
+    assert 1.0 < line / window.to_do.sentence.width() < 2.0
+    assert places[0] == places[1]
 
 
 def test_in_the_lowest_window_a_session_begins_at_its_plans_top_and_a_note_is_typed_where_it_is_seen(driver):
