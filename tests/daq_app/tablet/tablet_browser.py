@@ -67,6 +67,12 @@ class Browser:
             self.wait()
         return value
 
+    def reload(self, script, what=None):
+        """Load the page anew, and wait until a script gives something true on it."""
+        self.value("window.old = true")
+        self.call("Page.reload")
+        self.until(f"document.readyState == 'complete' && !window.old && {script}", what)
+
     def is_visible(self, name):
         return self.value(f"!document.getElementById('{name}').hidden")
 

@@ -134,6 +134,8 @@ def test_a_subject_answers_on_the_tablet_also_while_the_network_is_away(desk):
     ask(driver)  # by key
     browser.until("asked() && document.activeElement.id == 'line'", "the line")
     browser.key("ArrowRight")
+    browser.reload("asked() && document.activeElement.id == 'line'", "the line in the middle of the answer")
+    assert browser.value("mark") == 50
     browser.key("PageUp")
     browser.key("Enter")
     assert answer_to(driver, 2) == "score 60"
@@ -216,6 +218,7 @@ def test_other_kinds_of_answer_are_given_on_the_tablet_too(desk, protocol, give,
         browser.value("document.getElementById('number').value = typed = '', draw()")
     give(browser)
     browser.until("!document.getElementById('next').hidden")
+    browser.reload("!document.getElementById('next').hidden", "the answer begun before")
     browser.click("next")
     assert answer_to(driver, driver.session.trial) == expected
     browser.until("pending.length == 0", "the acknowledgement")
