@@ -120,7 +120,7 @@ class Mesh:
     def length_scale(self) -> float:
         """Length relative to which displacements are small or large: the root of the area [mm].
 
-        >>> two_by_half = np.moveaxis(np.mgrid[:9, :3] / 4.0, 0, -1)
+        >>> two_by_half = np.moveaxis(np.mgrid[:9, :3], 0, -1) / [4.0, -4.0]
         >>> round(grid_mesh(two_by_half, np.zeros(1), slice(0, 1), np.zeros(0)).length_scale, 3)
         1.0
         """
@@ -283,6 +283,14 @@ class Lines:
     def rows(self) -> int:
         """Number of elements across the tissue."""
         return max(len(self.bone) - 1, 0) + len(self.fat) + len(self.skin) - 2
+
+    def columns(self, arcs: Array) -> Indices:
+        """Return the number of the column that holds each of the `arcs` [mm]; beyond the tissue, of the one next to it.
+
+        >>> Lines((0.0, 1.0, 3.0), (), (0.0, 1.0), (1.0, 0.0)).columns(np.array([-1.0, 0.5, 2.0, 4.0]))
+        array([0, 0, 1, 1])
+        """
+        return np.searchsorted(self.arcs[1:-1], arcs)
 
     def divide(self, columns: Indices, rows: Indices) -> "Lines":
         """Return the lines with each gap divided equally: into `columns` (a,) and `rows` (b,) parts."""
