@@ -231,7 +231,7 @@ def _columns_of_edges(finger: Finger[Any], state: EquilibriumState) -> Indices:
     """Return the columns (m,) of the answer's mesh that hold the edges of contact of a state on it or nested in it."""
     edge = np.flatnonzero(np.diff(state.state))  # node before each edge of contact
     middle = (finger.geometry.skin_arcs[edge] + finger.geometry.skin_arcs[edge + 1]) / 2.0
-    return np.searchsorted(finger.geometry.lines.arcs, middle) - 1
+    return finger.geometry.lines.columns(middle)
 
 
 @lru_cache(maxsize=1)

@@ -30,7 +30,8 @@ from solver.arrays import Array
 from solver.contact import ForceLoad
 from solver.equilibrium import EquilibriumState, Newton
 from solver.failures import NotConverged
-from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction, Response, percent
+from solver.mesh import Lines
+from solver.prediction import COUNT, FORCES_AND_PLACES, ROW, NestedNumbers, Prediction, Response, percent
 from solver.quantities import NAMES
 from solver.scene import Scene
 from solver.scene.tables import USUAL_TOLERANCE
@@ -231,12 +232,27 @@ def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: St
     )
 
 
-def row_errors(row: Array, nested: NestedNumbers | None) -> Array:
-    """Return the relative errors (r,) of the SED of a row of receptors `row` (r,); nan where unknown."""
+def row_errors(row: Array, nested: NestedNumbers | None, lines: Lines) -> Array:
+    """Return the relative errors (r,) of the SED of a row of receptors `row` (r,) at `ROW`; nan where unknown.
+
+    `lines` are those of the mesh.
+    """
     if nested is None:
         return np.full(len(row), np.nan)
-    error = half_width(nested.row - row, nested.row_edge_errors) + nested.relative_excess * np.abs(row)
+    change = largest_nearby(nested.row - row, ROW, lines)
+    error = half_width(change, nested.row_edge_errors) + nested.relative_excess * np.abs(row)
     return error / np.maximum(row, np.finfo(float).tiny)
+
+
+def largest_nearby(changes: Array, arcs: Array, lines: Lines) -> Array:
+    """Return for each receptor of a row the largest of the `changes` (..., r) at most the width of its column away.
+
+    Along a row the error of a mesh varies from element to element, and passes zero elsewhere than the change to the
+    nested mesh. `arcs` (r,) are the receptors' positions [mm]. A change that is nan stays so.
+    """
+    near = np.abs(arcs[:, None] - arcs) <= np.diff(lines.arcs)[lines.columns(arcs)][:, None]
+    largest = np.fmax.reduce(np.where(near, np.abs(changes)[..., None, :], 0.0), axis=-1)
+    return np.where(np.isnan(changes), np.nan, largest)
 
 
 COMPARED = ("SED", "normal force", "drag", "indentation")  # the first four of `all_numbers`

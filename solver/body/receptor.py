@@ -60,8 +60,8 @@ def _gauss(start: Array, stop: Array) -> tuple[Array, Array]:
 
 def _probes(finger: FingerMesh, centre: Array, arc: Array, depth: Array) -> Probes:
     """Return probes (n m,) at every `depth` (m,) below each of the `arc` positions (n,) in turn [mm]."""
-    station = np.clip(np.searchsorted(finger.arcs, arc) - 1, 0, len(finger.arcs) - 2)
-    layer = np.clip(np.searchsorted(-finger.depths, -depth) - 1, 0, len(finger.depths) - 2)
+    station = np.searchsorted(finger.arcs[1:-1], arc)
+    layer = np.searchsorted(-finger.depths[1:-1], -depth)
     element = station[:, None] * (finger.fat + len(finger.depths) - 1) + finger.fat + layer
     side, reach = _along_side(finger, arc, station)
     radius = finger.outline.finger.tip_radius

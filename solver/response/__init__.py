@@ -84,7 +84,7 @@ def prediction(
         wall_s=solution.wall_s,
         setup_s=solution.setup_s,
         estimate_s=estimate_s,
-        row=Row(ROW, row, row_errors(row, nested_numbers)),
+        row=Row(ROW, row, row_errors(row, nested_numbers, finger.geometry.lines)),
         model=entry,
         audits=solution.audits,
         skin=skin_of(finger, state),

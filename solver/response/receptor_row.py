@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.accuracy.adaptivity import FingerState
 from solver.accuracy.convergence_order import refuse_folds
-from solver.accuracy.error_estimate import PARTS, Steps, edge_changes, edge_errors, half_width
+from solver.accuracy.error_estimate import PARTS, Steps, edge_changes, edge_errors, half_width, largest_nearby
 from solver.arrays import Array
 from solver.body import Patches
 from solver.body.finite import FiniteBody, FinitePatches
@@ -81,7 +81,8 @@ def _row_errors(prediction: Prediction, values: Array, arcs: Array, receptor: Re
         edge_changes(finger.newton, state, forces_of(scene, state.load), row_numbers(finger))
         for finger, state in (answer, nested)
     )
-    errors = half_width(finer - values.ravel(), edge_errors(on_mesh, on_nested))
+    change = largest_nearby(finer.reshape(values.shape) - values, arcs, prediction.geometry.lines)
+    errors = half_width(change.ravel(), edge_errors(on_mesh, on_nested))
     if in_steps:
         usual, *fewer = row_numbers(coarse)([end_of_path(scene, coarse, times) for times in (1.0, *PARTS.tolist())])
         errors += Steps.of(usual, np.array(fewer), scene.solve.target).bound

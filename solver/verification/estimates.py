@@ -132,9 +132,9 @@ def _random(request: Request, kinematics: Kinematics) -> Iterator[Estimate | Lef
 
 
 def compare(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.ndarray) -> list[Estimate]:
-    """Return the estimates of an answer's results with their errors against `truth` (3,) of relative `doubt` (3,).
+    """Return the estimates of an answer's results with their errors against `truth` of relative `doubt`.
 
-    Returns an empty list where the answer's errors are unknown.
+    The first three of either are those of `TRUE_NUMBERS`. Returns an empty list where the answer's errors are unknown.
     """
     if answer.nested is None:
         return []

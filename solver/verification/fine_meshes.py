@@ -4,16 +4,18 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 
 from solver.arrays import Array
 from solver.continuation.small_states import WIDE_MARGIN, expected_depth, settled_state
-from solver.equilibrium.finger import LinearFinger
+from solver.equilibrium import EquilibriumState
+from solver.equilibrium.finger import Finger, LinearFinger
 from solver.equilibrium.load_path import end_of_path
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
-from solver.prediction import Prediction
+from solver.prediction import COUNT, Prediction
 from solver.response import FIRST_FINENESS
 from solver.response.finite_answers import WIDER, Meshes, coarse_solution, solution_on
 from solver.response.solution import solve_many
@@ -33,9 +35,10 @@ _REFINED = {"small": 1e-4, "finite": 3e-4}  # tolerance that refines the third m
 
 
 def fine_numbers(scenes: Sequence[Scene], coarsening: float = 1.0) -> Array:
-    """Return SED [MPa], normal force and drag [N/mm] (3, n, 3) of scenes of one finger on three meshes.
+    """Return SED [MPa], normal force, drag [N/mm], then the SED of the row (3, n, 3 + r) of scenes on three meshes.
 
-    Elements are `coarsening` times as large as usual. Raises SolveFailure where fewer meshes have a solution.
+    All scenes have one finger. Elements are `coarsening` times as large as usual. Raises SolveFailure where fewer
+    meshes have a solution.
     """
     solves: list[Array] = []
     meshes = _MESHES[scenes[0].solve.kinematics, any(map(depends_on_way, scenes))]
@@ -48,7 +51,7 @@ def fine_numbers(scenes: Sequence[Scene], coarsening: float = 1.0) -> Array:
 
 
 def _solve_refined(scenes: Sequence[Scene], coarsening: float) -> Array:
-    """Return the results (n, 3) on the nested mesh of answers with a tight tolerance."""
+    """Return the results (n, 3 + r) on the nested mesh of answers with a tight tolerance."""
     tolerance = coarsening**2 * _REFINED[scenes[0].solve.kinematics]
     contrast = tolerance if len(scenes) > 1 else None
     answers = solve_many(
@@ -57,9 +60,8 @@ def _solve_refined(scenes: Sequence[Scene], coarsening: float) -> Array:
             for s in scenes
         ]
     )
-    numbers = [
-        answer.nested.numbers[:3] for answer in answers if isinstance(answer, Prediction) and answer.nested is not None
-    ]
+    nested = [answer.nested for answer in answers if isinstance(answer, Prediction) and answer.nested is not None]
+    numbers = [[*result.numbers[:3], *result.row] for result in nested]
     if len(numbers) < len(scenes):
         raise NotConverged("No refined mesh has a state.")
     return np.abs(numbers)
@@ -71,7 +73,7 @@ def depends_on_way(scene: Scene) -> bool:
 
 
 def numbers_on_mesh(scenes: Sequence[Scene], fineness: float, shift: bool, step_factor: int = 1) -> Array:
-    """Return SED [MPa], normal force and drag [N/mm] (n, 3) of surfaces on one mesh.
+    """Return SED [MPa], normal force, drag [N/mm], then the SED of the row (n, 3 + r) of surfaces on one mesh.
 
     Load paths take `step_factor` times the usual steps.
     """
@@ -87,7 +89,7 @@ def _small(scenes: Sequence[Scene], fineness: float, shift: bool, step_factor: i
         state = (end_of_path if stepwise else settled_state)(scene, finger, step_factor)
         if finger.reaches_out(state, finger.displacement(state)):
             raise NotConverged("Contact reaches out of the skin that is looked at.")
-        yield np.abs(finger.numbers([state])[0])
+        yield _numbers(finger, state)
 
 
 def _finite(scenes: Sequence[Scene], fineness: float, shift: bool, step_factor: int) -> Iterator[Array]:
@@ -97,9 +99,13 @@ def _finite(scenes: Sequence[Scene], fineness: float, shift: bool, step_factor: 
         sizing = replace(low.finger.geometry.sizing, fineness=fineness, shift=shift)
         if scene.viscoelastic and depends_on_way(scene):
             finger = meshes.finger(scene, replace(sizing, margin=WIDER))
-            yield np.abs(finger.numbers([end_of_path(scene, finger, step_factor)])[0])
+            yield _numbers(finger, end_of_path(scene, finger, step_factor))
             continue
         top = solution_on(scene, sizing, low, meshes, step_factor)
         if top.state.reaches_end:
             top = solution_on(scene, replace(sizing, margin=WIDER), low, meshes, step_factor)
-        yield np.abs(top.finger.numbers([top.state])[0])
+        yield _numbers(top.finger, top.state)
+
+
+def _numbers(finger: Finger[Any], state: EquilibriumState) -> Array:
+    return np.abs(np.delete(finger.numbers_and_row([state])[0], np.s_[3:COUNT]))

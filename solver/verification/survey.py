@@ -30,16 +30,17 @@ from solver.verification.truth import TRUE_NUMBERS, mean_and_doubt
 SURFACE_SET = "surfaces"  # the set of three surfaces solved together, whose differences are relative to their range
 BY_TOLERANCE = 5.0  # ratio of the tolerance of a difference to that of a scene
 TOLERANCES = (0.01, 0.003)  # of answers; the second is the default
+ROW_SED = "SED of the row of receptors"
 EXACT = 1e-12  # error below which a result follows from the input alone, and is not judged [-]
 HEADER = (
-    "set", "strain", "answers", "SED above", "corrected above", "force above", "drag above", "near", "missed unsaid",
-    "ratio", "corrected ratio", "rank", "sign", "corrected",
+    "set", "strain", "answers", "SED above", "corrected above", "force above", "drag above", "row above", "near",
+    "missed unsaid", "ratio", "corrected ratio", "row ratio", "rank", "sign", "corrected",
 )  # fmt: skip
 CAPTION = (
     "Two answers of each scene. Above: share of estimates at or above the true error. Near: below ten times the larger "
     "of true error and 0.02 %. Missed unsaid: tolerances said to be met that are not, without a warning. Ratio: median "
     "of estimate by error. Corrected: median of its error by the answer's. Counted where the reference is accurate "
-    "enough. Above and ratio: of the corrected SED, too."
+    "enough. Above and ratio: of the corrected SED and of the row of receptors, too."
 )
 
 
@@ -72,7 +73,9 @@ def solve(family: str, number: int, kinematics: Kinematics) -> Row:
         if together and len(predictions) == len(scenes):
             estimates.append(_difference(predictions, BY_TOLERANCE * tolerance, truth))
         elif predictions:
-            estimates += compare(predictions[0], tolerance, *mean_and_doubt(truth[:, 0]))
+            means, doubts = mean_and_doubt(truth[:, 0])
+            estimates += compare(predictions[0], tolerance, means, doubts)
+            estimates += _compare_row(predictions[0], tolerance, means[3:], doubts[3:])
     return Row(family, number, kinematics, tuple(estimates), tuple(dict.fromkeys(refusals)))
 
 
@@ -81,6 +84,17 @@ def _with_tolerance(scene: Scene, tolerance: float, *, together: bool) -> Scene:
     if together:
         return replace(scene, solve=replace(solve, contrast_tolerance=BY_TOLERANCE * tolerance))
     return replace(scene, solve=replace(solve, tolerance=tolerance))
+
+
+def _compare_row(answer: Prediction, tolerance: float, truth: Array, doubt: Array) -> list[Estimate]:
+    """Return the estimate and error of each receptor of an answer's row, against `truth` (r,) of relative `doubt`."""
+    row, scene = answer.row, answer.scene
+    known = np.isfinite(row.error) & np.isfinite(truth)
+    columns = row.error[known], np.abs(row.sed / truth - 1.0)[known], doubt[known]
+    return [
+        Estimate(scene.solve.kinematics, scene.title, ROW_SED, tolerance, answer.dofs, *numbers)
+        for numbers in zip(*(column.tolist() for column in columns), strict=True)
+    ]
 
 
 def _difference(answers: Sequence[Prediction], tolerance: float, solves: Array) -> Estimate:
@@ -109,8 +123,8 @@ def judgement(name: str, kinematics: str, rows: Iterable[Estimate]) -> tuple[str
     value lies on the truth's side) and corrected (median of its error over the answer's) are those of the SED.
     """
     decidable = [row for row in rows if row.above is not None and row.error > EXACT]
-    by_number = [[row for row in decidable if row.number == number] for number in GOALS]
-    sed = by_number[0]
+    by_number = [[row for row in decidable if row.number == number] for number in (*GOALS, ROW_SED)]
+    sed, *_, receptors = by_number
     within = [row for row in sed if row.meets_tolerance is not None and row.estimate <= row.tolerance]
     true = [row for row in sed if row.corrected is not None and row.doubt <= row.error / 3.0]
     halves = [row.corrected / row.error for row in true if row.corrected is not None]
@@ -123,6 +137,7 @@ def judgement(name: str, kinematics: str, rows: Iterable[Estimate]) -> tuple[str
         f"{sum(not row.meets_tolerance and not row.warned for row in within)} of {len(within)}",
         _ratio(sed),
         _ratio(by_number[1]),
+        _ratio(receptors),
         f"{spearmanr([(row.estimate, row.error) for row in sed]).statistic:.2f}" if len(sed) > 2 else "–",
         _share([row.towards for row in true]),
         f"{median(halves):.2f}" if halves else "–",

@@ -53,7 +53,7 @@ def measure(request: Request) -> Iterator[Truth | LeftOut]:
 
 
 def mean_and_doubt(solves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return mean and doubt (3,) of the results on three meshes (3, 3)."""
+    """Return mean and doubt (c,) of c results on three meshes (3, c)."""
     mean = solves.mean(axis=0)
     return mean, np.abs(solves / np.where(mean > 0.0, mean, 1.0) - 1.0).max(axis=0)
 

@@ -191,6 +191,21 @@ def test_estimates_of_the_row_hold_what_cancels_in_its_changes_between_two_meshe
     assert np.mean(error <= by_change) < 0.9
 
 
+@pytest.mark.parametrize("number", [46021, 46027])
+def test_where_a_receptor_s_change_passes_zero_its_estimate_keeps_the_size_of_the_errors_around(number):
+    sliding = random_scene("stiff", number, "small")
+    rough, fine = (
+        solve(replace(sliding, solve=replace(sliding.solve, tolerance=tolerance, evidence="quick")))
+        for tolerance in (0.003, 0.0001)
+    )
+    near = rough.row.sed > 0.1 * np.nanmax(rough.row.sed)
+    assert near.sum() >= 20
+    error = np.abs(rough.row.sed - fine.nested.row)[near]
+    by_change = half_width(rough.nested.row - rough.row.sed, rough.nested.row_edge_errors)[near]
+    assert np.max(error / by_change) > 15.0
+    assert np.max(error / (rough.row.error * rough.row.sed)[near]) < 3.0
+
+
 def test_where_the_nested_mesh_has_no_state_nothing_is_known():
     estimate = errors(Scene(friction=Friction(0.3), loading=Loading(1.0)), np.ones(COUNT), None, None)
     assert estimate[:5] == (1.0, 1.0, 1.0, 1.0, 1.0)
