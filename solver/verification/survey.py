@@ -20,7 +20,7 @@ from solver.failures import SolveFailure
 from solver.prediction import Prediction, percent
 from solver.response.solution import solve_many
 from solver.scene import Scene
-from solver.verification.estimates import GOALS, Estimate, compare
+from solver.verification.estimates import CORRECTED, Estimate, compare
 from solver.verification.fine_meshes import fine_numbers
 from solver.verification.marked_page import fill_marks
 from solver.verification.methods import Kinematics
@@ -33,8 +33,8 @@ TOLERANCES = (0.01, 0.003)  # of answers; the second is the default
 ROW_SED = "SED of the row of receptors"
 EXACT = 1e-12  # error below which a result follows from the input alone, and is not judged [-]
 HEADER = (
-    "set", "strain", "answers", "SED above", "corrected above", "force above", "drag above", "row above", "near",
-    "missed unsaid", "ratio", "corrected ratio", "row ratio", "rank", "sign", "corrected",
+    "set", "strain", "answers", "SED above", "corrected above", "forces above", "row above", "near", "missed unsaid",
+    "ratio", "corrected ratio", "row ratio", "rank", "sign", "corrected",
 )  # fmt: skip
 CAPTION = (
     "Two answers of each scene. Above: share of estimates at or above the true error. Near: below ten times the larger "
@@ -123,8 +123,9 @@ def judgement(name: str, kinematics: str, rows: Iterable[Estimate]) -> tuple[str
     value lies on the truth's side) and corrected (median of its error over the answer's) are those of the SED.
     """
     decidable = [row for row in rows if row.above is not None and row.error > EXACT]
-    by_number = [[row for row in decidable if row.number == number] for number in (*GOALS, ROW_SED)]
-    sed, *_, receptors = by_number
+    goals = (TRUE_NUMBERS[:1], (CORRECTED,), TRUE_NUMBERS[1:], (ROW_SED,))
+    columns = [[row for row in decidable if row.number in names] for names in goals]
+    sed, corrected, _, receptors = columns
     within = [row for row in sed if row.meets_tolerance is not None and row.estimate <= row.tolerance]
     true = [row for row in sed if row.corrected is not None and row.doubt <= row.error / 3.0]
     halves = [row.corrected / row.error for row in true if row.corrected is not None]
@@ -132,11 +133,11 @@ def judgement(name: str, kinematics: str, rows: Iterable[Estimate]) -> tuple[str
         name,
         kinematics,
         str(len(sed)),
-        *(_share([bool(row.above) for row in column]) for column in by_number),
+        *(_share([bool(row.above) for row in column]) for column in columns),
         _share([row.near for row in sed if row.near is not None]),
         f"{sum(not row.meets_tolerance and not row.warned for row in within)} of {len(within)}",
         _ratio(sed),
-        _ratio(by_number[1]),
+        _ratio(corrected),
         _ratio(receptors),
         f"{spearmanr([(row.estimate, row.error) for row in sed]).statistic:.2f}" if len(sed) > 2 else "–",
         _share([row.towards for row in true]),
@@ -149,7 +150,7 @@ def _ratio(rows: Sequence[Estimate]) -> str:
 
 
 def _share(verdicts: Sequence[bool]) -> str:
-    return f"{100.0 * sum(verdicts) / len(verdicts):.0f} %" if verdicts else "–"
+    return f"{100.0 * sum(verdicts) / len(verdicts):.3g} %" if verdicts else "–"
 
 
 def misses(rows: Iterable[Estimate]) -> Iterator[str]:
