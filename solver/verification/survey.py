@@ -89,8 +89,8 @@ def _with_tolerance(scene: Scene, tolerance: float, *, together: bool) -> Scene:
 def _compare_row(answer: Prediction, tolerance: float, truth: Array, doubt: Array) -> list[Estimate]:
     """Return the estimate and error of each receptor of an answer's row, against `truth` (r,) of relative `doubt`."""
     row, scene = answer.row, answer.scene
-    known = np.isfinite(row.error) & np.isfinite(truth)
-    columns = row.error[known], np.abs(row.sed / truth - 1.0)[known], doubt[known]
+    finite = np.isfinite(row.error) & np.isfinite(truth)
+    columns = row.error[finite], np.abs(row.sed / truth - 1.0)[finite], doubt[finite]
     return [
         Estimate(scene.solve.kinematics, scene.title, ROW_SED, tolerance, answer.dofs, *numbers)
         for numbers in zip(*(column.tolist() for column in columns), strict=True)
