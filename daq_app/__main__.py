@@ -1,5 +1,6 @@
 """Entry point of the program."""
 
+import atexit
 import gc
 import os
 import signal
@@ -12,6 +13,7 @@ def main() -> None:
     if answered:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the program can answer Ctrl-C with a message
     _open_streams()
+    atexit.register(_flush_streams)
     from daq_app.child_process import keep_current_folder_out, use_one_thread
 
     keep_current_folder_out()
@@ -53,14 +55,22 @@ def _open_streams() -> None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode, encoding="utf-8"))
 
 
+def _flush_streams() -> None:
+    """Write what the standard streams hold. What they refuse was reported, and must not change the exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
 def _leave(code: int) -> None:
     """Exit with a code; immediately if the user stopped the program and no child process is left."""
     from daq_app.console import STOPPED
 
     module = sys.modules.get("multiprocessing")  # slow to import, and most verbs start no process
     if code == STOPPED and not (module and module.active_children()):
-        sys.stdout.flush()
-        sys.stderr.flush()
+        _flush_streams()
         os._exit(code)  # finalising the loaded libraries takes longer than Ctrl-C may
     gc.freeze()  # skips the last garbage collection, which takes a tenth of a cold solve
     sys.exit(code)

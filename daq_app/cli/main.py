@@ -87,7 +87,7 @@ def _dispatch(arguments: list[str]) -> int:
     if name == "--version":
         from sessions.recording.head import software_versions  # here, because no verb needs it earlier
 
-        print("daq-app", software_versions()["daq-app"])
+        Console(as_json=False).say(f"daq-app {software_versions()['daq-app']}")
         return DONE
     if name not in VERBS:
         return _report(f"there is no verb '{name}': 'daq-app --help' lists the verbs", WRONG)

@@ -190,14 +190,24 @@ def test_every_failure_that_is_a_wrong_value_exists_where_it_is_looked_for(name)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
-@pytest.mark.parametrize("words", [["--help"], ["solve", "--help"], ["window", "--help"]])
-def test_help_that_cannot_be_written_is_exit_code_1_and_a_sentence(words):
+@pytest.mark.parametrize("words", [["--help"], ["--version"], ["solve", "--help"], ["window", "--help"]])
+def test_an_answer_that_cannot_be_written_is_exit_code_1_and_one_sentence(words, monkeypatch):
+    monkeypatch.delenv("PYTHONUNBUFFERED", raising=False)  # with it no text waits in a buffer for the last flush
     with Path("/dev/full").open("w") as full:
         process = subprocess.run(
             [sys.executable, "-m", "daq_app", *words], stdout=full, stderr=subprocess.PIPE, text=True, check=False
         )
     assert process.returncode == 1
-    assert "could not be written to standard output" in process.stderr
+    (sentence,) = process.stderr.splitlines()
+    assert "could not be written to standard output" in sentence
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+def test_messages_that_cannot_be_written_change_no_exit_code(monkeypatch):
+    monkeypatch.delenv("PYTHONUNBUFFERED", raising=False)
+    with Path("/dev/full").open("w") as full:
+        words = [sys.executable, "-m", "daq_app", "nonsense"]
+        assert subprocess.run(words, stderr=full, check=False).returncode == 2
 
 
 @pytest.mark.skipif(os.name != "posix", reason="asks a shell")
