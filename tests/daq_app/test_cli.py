@@ -189,7 +189,10 @@ def test_every_failure_that_is_a_wrong_value_exists_where_it_is_looked_for(name)
     assert issubclass(getattr(importlib.import_module(module), kind), Exception)
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+on_a_full_device = pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+
+
+@on_a_full_device
 @pytest.mark.parametrize("words", [["--help"], ["--version"], ["solve", "--help"], ["window", "--help"]])
 def test_an_answer_that_cannot_be_written_is_exit_code_1_and_one_sentence(words, monkeypatch):
     monkeypatch.delenv("PYTHONUNBUFFERED", raising=False)  # with it no text waits in a buffer for the last flush
@@ -202,7 +205,7 @@ def test_an_answer_that_cannot_be_written_is_exit_code_1_and_one_sentence(words,
     assert "could not be written to standard output" in sentence
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+@on_a_full_device
 def test_messages_that_cannot_be_written_change_no_exit_code(monkeypatch):
     monkeypatch.delenv("PYTHONUNBUFFERED", raising=False)
     with Path("/dev/full").open("w") as full:
